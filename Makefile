@@ -1,0 +1,128 @@
+# make run    installs what is missing, builds, starts the daemon
+# make test   installs what tests need, builds, runs all tests
+# make demo   four pictures into out/, with their timings
+# SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := all
+.DELETE_ON_ERROR:
+
+comma := ,
+SAN ?=
+B := build$(if $(SAN),/san-$(subst $(comma),-,$(SAN)))
+
+CC := gcc
+CXX := g++
+OPT ?= -O2 -g
+SANFLAGS := $(if $(SAN),-fsanitize=$(SAN) -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
+CPPFLAGS := -I. -D_GNU_SOURCE -D_FORTIFY_SOURCE=2 -MMD -MP
+CFLAGS := -std=c17 $(OPT) -Wall -Wextra -Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wvla -fstack-protector-strong $(SANFLAGS)
+CXXFLAGS := -std=c++17 $(OPT) -Wall -Wextra -Werror $(SANFLAGS)
+LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
+
+# Debian packages: to build and run, and to test. scripts/packages.sh installs those that are missing.
+PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
+	libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libcurl4-openssl-dev ca-certificates curl
+TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml clang-format procps
+
+pkg = $(shell pkg-config $(1) $(2))
+GL_LIBS = $(call pkg,--libs,epoxy) -lEGL -lm
+SERVER_LIBS = $(call pkg,--libs,libmicrohttpd jansson nettle) -lnova -ldl
+CLIENT_LIBS = $(call pkg,--libs,libcurl jansson)
+
+# --- what is built from what -------------------------------------------------------------------------------------------------
+# renderer/ without its programs and its C++ is one archive; it knows no HTTP, JSON or OpenImageIO (render-bench proves it).
+RENDERER_SRC := $(wildcard renderer/*.c renderer/optics/*.c renderer/gl/*.c renderer/stages/*.c renderer/image/*.c)
+SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c))
+CLIENT_SRC := $(wildcard clients/*.c)
+UNIT_SRC := $(wildcard tests/unit/test_*.c)
+UNIT_CXX := $(wildcard tests/unit/test_*.cpp)
+SHADERS := $(wildcard shaders/*.glsl shaders/*/*.glsl)
+RESOURCES := openapi.yaml $(wildcard server/presets/*.json)
+
+obj = $(patsubst %,$(B)/%.o,$(1))
+RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
+PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
+UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
+
+.PHONY: all programs kernel run test demo unit http format clean packages test-packages
+all: programs kernel
+programs: $(PROGRAMS) $(B)/stratus-image.so
+
+# The Mie kernel table does not depend on sanitizers: always made by the plain program, once.
+kernel: build/mie.kernel
+KERNEL_SRC := renderer/programs/kernel.c $(wildcard renderer/optics/mie*.c renderer/optics/kernel*.c) renderer/log.c
+build/mie.kernel: | build/stratus-kernel
+	build/stratus-kernel -o $@
+build/stratus-kernel: $(KERNEL_SRC:%=build/%.o)
+	@mkdir -p $(@D)
+	$(CC) -pthread $^ -o $@ -lm
+
+$(B)/librenderer.a: $(RENDERER_OBJ)
+	rm -f $@; ar rcs $@ $^
+$(B)/libserver.a: $(call obj,$(SERVER_SRC)) $(B)/gen/resources.o
+	rm -f $@; ar rcs $@ $^
+
+$(B)/stratusd: $(call obj,server/main.c) $(B)/libserver.a $(B)/librenderer.a
+	$(CC) $(LDFLAGS) $^ -o $@ $(SERVER_LIBS) $(GL_LIBS)
+$(B)/stratus: $(call obj,$(CLIENT_SRC))
+	$(CC) $(LDFLAGS) $^ -o $@ $(CLIENT_LIBS) -lm
+$(B)/render-bench: $(call obj,renderer/programs/bench.c) $(B)/librenderer.a
+	$(CC) $(LDFLAGS) $^ -o $@ $(GL_LIBS) -ldl
+$(B)/stratus-image.so: $(call obj,renderer/image/oiio.cpp)
+	$(CXX) $(LDFLAGS) -shared $^ -o $@ $(call pkg,--libs,OpenImageIO)
+
+$(B)/%.c.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+$(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
+	@mkdir -p $(@D)
+	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -fPIC $(call pkg,--cflags,OpenImageIO) -c $< -o $@
+
+# The Mie loops are the one place where the compiler's best vector code is worth asking for.
+$(B)/renderer/optics/%.c.o: OPT := -O3 -g
+
+# Shaders and resources are embedded unchanged; the table maps names to bytes (renderer/embed.h).
+$(B)/gen/shaders.S: $(SHADERS) scripts/embed.sh
+	@mkdir -p $(@D)
+	scripts/embed.sh shader_files $(SHADERS) >$@
+$(B)/gen/resources.S: $(RESOURCES) scripts/embed.sh
+	@mkdir -p $(@D)
+	scripts/embed.sh resource_files $(RESOURCES) >$@
+$(B)/gen/%.o: $(B)/gen/%.S
+	$(CC) -c $< -o $@
+
+$(B)/tests/%: tests/unit/%.c $(B)/libserver.a $(B)/librenderer.a
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS) $(CFLAGS) -MF $@.d $< $(B)/libserver.a $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(SERVER_LIBS) $(GL_LIBS)
+$(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
+	@mkdir -p $(@D)
+	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(GL_LIBS)
+
+-include $(shell find $(B) -name '*.d' 2>/dev/null)
+
+# --- what people type ----------------------------------------------------------------------------------------------------------
+packages:
+	@scripts/packages.sh $(PACKAGES)
+test-packages: packages
+	@scripts/packages.sh $(TEST_PACKAGES)
+
+run: packages
+	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
+	@scripts/run.sh $(B)
+
+demo: packages
+	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
+	@scripts/demo.sh $(B)
+
+test: test-packages
+	@$(MAKE) --no-print-directory -j$$(nproc) programs unit && $(MAKE) --no-print-directory kernel
+	@scripts/test.sh $(B)
+
+unit: $(UNIT)
+
+format:
+	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
+
+clean:
+	rm -rf build out

@@ -1,0 +1,36 @@
+/* Image files in memory, through OpenImageIO.
+ *
+ * OpenImageIO costs a process 0.17 s at start and some 126 MB, so it lives in a module of its own (build/stratus-image.so, the one C++ file
+ * oiio.cpp) that image_module_load opens, beside the start of the GPU.
+ */
+#ifndef STRATUS_RENDERER_IMAGE_IMAGE_H
+#define STRATUS_RENDERER_IMAGE_IMAGE_H
+
+#include "renderer/renderer.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct image_metadata {
+	const char *scene_json; /* canonical scene, kept as "stratus:scene"; never NULL */
+	const char *request_id; /* or NULL; not written to files (same scene, same bytes), for the log only */
+	const char *software;   /* "stratus 0.1.0" */
+};
+
+struct image_buffer {
+	unsigned char *data; /* malloc'd */
+	size_t size;
+};
+
+struct image_api {
+	/* Encodes a frame as the scene's output asks (format, compression, type, bits). Any thread, several at once. false and a message in
+	 * `error` (at most error_size) on failure; buffer->data is then NULL. */
+	bool (*encode)(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata,
+		       struct image_buffer *buffer, char *error, size_t error_size);
+};
+
+/* Loads the module: from `path`, or when NULL from stratus-image.so beside the running program or in ../lib/stratus. NULL and a log line on
+ * failure. Loads once; further calls return the same. Any thread. */
+const struct image_api *image_module_load(const char *path);
+
+#endif

@@ -1,0 +1,35 @@
+/* The one-dimensional slab model of Bouthors, Neyret, Lefebvre 2006, appendix A, with the fitted parameters of appendix B.
+ *
+ * Appendix B belongs to one droplet size distribution, whose T_ms fits an extinction of 0.0388 /m; another distribution is taken by
+ * similarity: its thickness counts as H kappa / 0.0388.
+ */
+#ifndef STRATUS_RENDERER_OPTICS_PAPER_SLAB_H
+#define STRATUS_RENDERER_OPTICS_PAPER_SLAB_H
+
+/* Extinction (1/m) that appendix B was fitted for. */
+#define PAPER_EXTINCTION_PER_M 0.0388
+
+struct paper_fit {
+	double beta, b, c, kappa_c, t, r; /* c and kappa_c in 1/m of the paper's distribution */
+};
+
+/* Fractions of the incident flux. Index 3 stands for three and more scatterings; r[0] is 0. */
+struct paper_orders {
+	double t[4], r[4];
+	double t_total, r_total; /* T_ms and R_ms = 1 - T_ms */
+};
+
+/* Parameters at an incidence, interpolated between the rows of appendix B. zenith_rad 0..pi/2. Any thread. */
+struct paper_fit paper_fit_at(double zenith_rad);
+
+/* Orders of scattering. thickness_m: H >= 0 of the paper's distribution (by similarity: H kappa / PAPER_EXTINCTION_PER_M);
+ * slant_depth_modified: kappa_S H / mu_l, so that T_0 = exp(-slant_depth_modified). Never negative, never NaN. Any thread. */
+struct paper_orders paper_orders_at(const struct paper_fit *fit, double thickness_m, double slant_depth_modified);
+
+/* Total transmittance T_ms alone, 0..1. */
+double paper_transmittance(const struct paper_fit *fit, double thickness_m);
+
+/* Spherical transmittance 2 integral T_ms(mu) mu dmu under uniform diffuse light. */
+double paper_spherical_transmittance(double thickness_m);
+
+#endif

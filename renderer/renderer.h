@@ -1,0 +1,88 @@
+/* The renderer: scenes in, pixels out. Knows no HTTP, no JSON and no image files.
+ *
+ * One thread owns a renderer and its OpenGL context: renderer_create, renderer_render and renderer_destroy are called by that
+ * thread alone. renderer_info and renderer_kernel may be read by any thread after creation.
+ */
+#ifndef STRATUS_RENDERER_RENDERER_H
+#define STRATUS_RENDERER_RENDERER_H
+
+#include "renderer/optics/optics.h"
+#include "renderer/scene.h"
+
+#include <stddef.h>
+
+/* Changes whenever the same scene may give other pixels. Part of every ETag. */
+#define RENDERER_VERSION "0.1.0"
+
+enum pass_kind { PASS_AUTO, PASS_FRAGMENT, PASS_COMPUTE };
+
+struct renderer_params {
+	int device_index;            /* EGL device, from 0; negative: the first hardware device, else software */
+	bool require_gpu;            /* refuse software rendering */
+	enum pass_kind pass_kind;    /* how full-screen passes run; PASS_AUTO measures at start */
+	const char *shader_dir;      /* read shaders from here instead of the embedded ones; NULL: embedded */
+	const struct kernel *kernel; /* Mie kernel table; must outlive the renderer */
+	size_t cache_bytes;          /* bound of what the stages remember on the GPU; 0: 256 MiB */
+};
+
+struct renderer_info {
+	const char *vendor, *renderer, *version; /* strings of OpenGL */
+	const char *platform;                    /* how EGL came up: "device 0" or "surfaceless" */
+	bool software;
+	enum pass_kind pass_kind; /* what is in use, never PASS_AUTO */
+	int max_texture_size;
+};
+
+enum stage { STAGE_OPTICS, STAGE_SKY, STAGE_FIELD, STAGE_RADIOSITY, STAGE_VIEW, STAGE_READBACK, STAGE_COUNT };
+
+/* "optics", "sky", "field", "radiosity", "view", "readback" */
+extern const char *const stage_names[STAGE_COUNT];
+
+struct stage_timing {
+	double milliseconds; /* processor time for optics and read-back, GPU timer queries for the rest */
+	bool reused;         /* taken from memory */
+};
+
+enum pixel_type { PIXEL_U8, PIXEL_U16, PIXEL_F32 };
+
+/* One rendered picture: `layer_count` planes of height x width x channels, rows from the top, channels interleaved. */
+struct frame {
+	int width, height;
+	enum pixel_type type; /* U8/U16: exposed, toned, sRGB encoded. F32: scene-linear Rec.709, (1,1,1) = 1000 cd/m2 */
+	int channels;         /* 3: RGB; single-valued layers (optical_thickness, distance) repeat their value */
+	int layer_count;
+	enum layer layer[LAYER_COUNT];
+	void *pixels; /* malloc'd */
+	size_t bytes;
+
+	struct stage_timing timing[STAGE_COUNT];
+	int radiosity_passes;
+	double radiosity_residual;      /* relative energy left when the exchange stopped, 0 when not run */
+	double exposure_ev;             /* what multiplied the picture: 2^exposure_ev, also when automatic */
+	double global_illuminance_lux;  /* horizontal, at the camera: direct + diffuse */
+	double direct_illuminance_lux;  /* horizontal, at the camera; mean over the cloud tile below the clouds */
+	double diffuse_illuminance_lux; /* horizontal, at the camera */
+};
+
+struct renderer;
+
+/* Brings up EGL and OpenGL and compiles every shader. NULL (the log names what was tried) on failure. */
+struct renderer *renderer_create(const struct renderer_params *params);
+void renderer_destroy(struct renderer *renderer);
+
+const struct renderer_info *renderer_info(const struct renderer *renderer);
+
+/* Asked between passes by renderer_render: true stops the work. */
+typedef bool renderer_cancelled(void *context);
+
+enum render_result { RENDER_OK, RENDER_CANCELLED, RENDER_OUT_OF_MEMORY, RENDER_FAILED };
+
+/* Renders a valid scene that names no assets. cancelled may be NULL. On RENDER_OK the caller owns frame->pixels (frame_finish); else the
+ * frame is zeroed and one log line says why. */
+enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
+				   struct frame *frame);
+
+/* Frees the pixels. Takes a zeroed frame. */
+void frame_finish(struct frame *frame);
+
+#endif

@@ -1,0 +1,81 @@
+#include "renderer/scene.h"
+
+#include <math.h>
+#include <string.h>
+
+const char *const scene_cloud_type_names[] = {"stratus", "stratocumulus", "altocumulus", "cirrocumulus", "none", NULL};
+const char *const scene_ground_type_names[] = {"grass", "country", "soil", "sand", "sea", "sea_ice", "snow", "black", "lambert", NULL};
+const char *const scene_projection_names[] = {"perspective", "fisheye", "equirectangular", "cubemap", NULL};
+const char *const scene_model_names[] = {"slab", "reference", "volume", "planar", NULL};
+const char *const scene_shading_names[] = {"solved", "paper", NULL};
+const char *const scene_optics_names[] = {"mie", "paper", NULL};
+const char *const scene_format_names[] = {"png", "exr", NULL};
+const char *const scene_tone_names[] = {"filmic", "linear", NULL};
+const char *const scene_png_compression_names[] = {"fast", "small", NULL};
+const char *const scene_exr_compression_names[] = {"none", "rle", "zip", "piz", "dwaa", NULL};
+const char *const scene_exr_type_names[] = {"auto", "half", "float", NULL};
+const char *const scene_layer_names[] = {"color",
+					 "sun_direct",
+					 "order0",
+					 "order1",
+					 "order2",
+					 "multiple",
+					 "cloud_sky",
+					 "cloud_ground",
+					 "sky",
+					 "ground",
+					 "air",
+					 "transmittance",
+					 "optical_thickness",
+					 "distance",
+					 NULL};
+
+struct scene scene_default(void)
+{
+	struct scene scene;
+	memset(&scene, 0, sizeof scene);
+	scene.sun = (struct scene_sun){.elevation_deg = 35, .azimuth_deg = 140};
+	scene.dsd = (struct scene_dsd){.n0_per_cm3 = 300, .gamma = 2, .effective_radius_um = 7};
+	scene.clouds.type = CLOUD_STRATOCUMULUS;
+	scene.clouds.seed = 1;
+	scene.clouds.coverage = 0.7;
+	scene.clouds.base_m = 1200;
+	scene.clouds.thickness_m = 400;
+	scene.clouds.tile_m = 20000;
+	scene.clouds.resolution = 512;
+	scene.clouds.wind_mps[0] = 8;
+	scene.clouds.wind_mps[1] = 3;
+	scene.ground.type = GROUND_COUNTRY;
+	scene.ground.albedo_scale = 1;
+	scene.atmosphere = (struct scene_atmosphere){.aerosol_optical_depth = 0.1, .ozone_du = 300};
+	scene.camera.position_m[2] = 2;
+	scene.camera.azimuth_deg = 140;
+	scene.camera.elevation_deg = 20;
+	scene.camera.vertical_fov_deg = 60;
+	scene.camera.projection = PROJECTION_PERSPECTIVE;
+	scene.radiosity.enabled = true;
+	scene.radiosity.tolerance = 0.001;
+	scene.radiosity.max_passes = 64;
+	/* The exact slab ("solved") becomes the default with its solver; until then the paper's own shading is. */
+	scene.model.name = MODEL_SLAB;
+	scene.model.shading = SHADING_PAPER;
+	scene.model.optics = OPTICS_MIE;
+	scene.output.width = 1024;
+	scene.output.height = 768;
+	scene.output.format = IMAGE_PNG;
+	scene.output.exposure_auto = true;
+	scene.output.tone = TONE_FILMIC;
+	scene.output.layers = 1u << LAYER_COLOR;
+	scene.output.exr_compression = EXR_ZIP;
+	scene.output.exr_type = EXR_AUTO;
+	scene.output.png_compression = PNG_FAST;
+	scene.output.bits = 8;
+	return scene;
+}
+
+double scene_dsd_liquid_water(const struct scene_dsd *dsd)
+{
+	const double rn_m = dsd->effective_radius_um / (dsd->gamma + 2) * 1e-6;
+	const double mean_r3 = rn_m * rn_m * rn_m * dsd->gamma * (dsd->gamma + 1) * (dsd->gamma + 2);
+	return 4.0 / 3.0 * M_PI * 1e6 * dsd->n0_per_cm3 * 1e6 * mean_r3;
+}

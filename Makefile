@@ -16,7 +16,7 @@ CXX := g++
 OPT ?= -O2 -g
 SANFLAGS := $(if $(SAN),-fsanitize=$(SAN) -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
 CPPFLAGS := -I. -D_GNU_SOURCE -D_FORTIFY_SOURCE=2 -MMD -MP
-CFLAGS := -std=c17 $(OPT) -Wall -Wextra -Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wvla -fstack-protector-strong $(SANFLAGS)
+CFLAGS = -std=c17 $(OPT) -Wall -Wextra -Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wvla -fstack-protector-strong $(SANFLAGS)
 CXXFLAGS := -std=c++17 $(OPT) -Wall -Wextra -Werror $(SANFLAGS)
 LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 
@@ -51,7 +51,7 @@ programs: $(PROGRAMS) $(B)/stratus-image.so
 
 # The Mie kernel table does not depend on sanitizers: always made by the plain program, once.
 kernel: build/mie.kernel
-KERNEL_SRC := renderer/programs/kernel.c $(wildcard renderer/optics/mie*.c renderer/optics/kernel*.c) renderer/log.c
+KERNEL_SRC := renderer/programs/kernel.c $(wildcard renderer/optics/mie*.c renderer/optics/kernel*.c) renderer/optics/quadrature.c renderer/log.c
 build/mie.kernel: | build/stratus-kernel
 	build/stratus-kernel -o $@
 build/stratus-kernel: $(KERNEL_SRC:%=build/%.o)
@@ -80,7 +80,7 @@ $(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -fPIC $(call pkg,--cflags,OpenImageIO) -c $< -o $@
 
 # The Mie loops are the one place where the compiler's best vector code is worth asking for.
-$(B)/renderer/optics/%.c.o: OPT := -O3 -g
+$(B)/renderer/optics/%.c.o: OPT := -O3 -g -ffp-contract=fast
 
 # Shaders and resources are embedded unchanged; the table maps names to bytes (renderer/embed.h).
 $(B)/gen/shaders.S: $(SHADERS) scripts/embed.sh

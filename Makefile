@@ -22,7 +22,7 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 
 # Debian packages: to build and run, and to test. scripts/packages.sh installs those that are missing.
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
-	libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libcurl4-openssl-dev ca-certificates curl
+	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml clang-format procps
 
 pkg = $(shell pkg-config $(1) $(2))
@@ -69,12 +69,15 @@ $(B)/stratus: $(call obj,$(CLIENT_SRC))
 	$(CC) $(LDFLAGS) $^ -o $@ $(CLIENT_LIBS) -lm
 $(B)/render-bench: $(call obj,renderer/programs/bench.c) $(B)/librenderer.a
 	$(CC) $(LDFLAGS) $^ -o $@ $(GL_LIBS) -ldl
-$(B)/stratus-image.so: $(call obj,renderer/image/oiio.cpp)
-	$(CXX) $(LDFLAGS) -shared $^ -o $@ $(call pkg,--libs,OpenImageIO)
+$(B)/stratus-image.so: $(call obj,renderer/image/oiio.cpp) $(B)/pic/renderer/scene.c.o
+	$(CXX) $(LDFLAGS) -shared $^ -o $@ $(call pkg,--libs,OpenImageIO zlib)
 
 $(B)/%.c.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+$(B)/pic/%.c.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS) $(CFLAGS) -fPIC -c $< -o $@
 $(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -fPIC $(call pkg,--cflags,OpenImageIO) -c $< -o $@

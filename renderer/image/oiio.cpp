@@ -1,0 +1,344 @@
+/* The module that writes image files through OpenImageIO; the only C++ of the tree (image.h tells why it is a module).
+ *
+ * Inside, failures are exceptions; encode() at the end is the one door to C and turns them into messages. Nothing varying enters
+ * a file (no date, no host, no request id), so that the same frame and scene give the same bytes.
+ */
+extern "C" {
+#include "renderer/image/image.h"
+}
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/half.h>
+#include <OpenImageIO/imageio.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+extern "C" const struct image_api *stratus_image_api(void);
+
+namespace
+{
+
+using OIIO::ImageOutput;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+
+using bytes = std::vector<unsigned char>;
+
+constexpr float half_max = 65504.0f;
+
+/* PNG_FILTER_SUB of libpng: on smooth, dithered pictures both the quickest filter and the one that leaves the smallest file. */
+constexpr int png_filter_sub = 0x10;
+
+std::unique_ptr<ImageOutput> open_output(const char *format, const ImageSpec &spec, OIIO::Filesystem::IOProxy *proxy)
+{
+	auto out = ImageOutput::create(format);
+	if (!out)
+		throw std::runtime_error(OIIO::geterror());
+	out->threads(1);
+	out->set_ioproxy(proxy);
+	if (!out->open(std::string("memory.") + format, spec))
+		throw std::runtime_error(out->geterror());
+	return out;
+}
+
+void close_output(ImageOutput &out)
+{
+	if (!out.close())
+		throw std::runtime_error(out.geterror());
+}
+
+void require(bool condition, const char *message)
+{
+	if (!condition)
+		throw std::runtime_error(message);
+}
+
+/* --- PNG ------------------------------------------------------------------------------------------------------------------ */
+
+void append_be32(bytes &to, uint32_t value)
+{
+	for (int shift = 24; shift >= 0; shift -= 8)
+		to.push_back(static_cast<unsigned char>(value >> shift));
+}
+
+/* An uncompressed iTXt chunk. OpenImageIO writes texts as tEXt, which is Latin-1 by definition; JSON is UTF-8. */
+bytes png_text_chunk(const std::string &keyword, const char *text)
+{
+	bytes chunk;
+	const std::string body = "iTXt" + keyword + std::string(5, '\0') + text; /* no compression, language or translated keyword */
+	append_be32(chunk, static_cast<uint32_t>(body.size() - 4));
+	chunk.insert(chunk.end(), body.begin(), body.end());
+	append_be32(chunk, static_cast<uint32_t>(crc32(0, reinterpret_cast<const Bytef *>(body.data()), static_cast<uInt>(body.size()))));
+	return chunk;
+}
+
+/* Texts go right behind the header, where a reader of a truncated file finds them too. */
+void png_insert_text(bytes &png, const std::string &keyword, const char *text)
+{
+	constexpr size_t header_end = 8 + 25; /* signature and IHDR */
+	require(png.size() > header_end, "the PNG encoder wrote no header");
+	const bytes chunk = png_text_chunk(keyword, text);
+	png.insert(png.begin() + header_end, chunk.begin(), chunk.end());
+}
+
+bytes encode_png(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata)
+{
+	const int bits = frame.type == PIXEL_U8 ? 8 : 16;
+	require(frame.type != PIXEL_F32 && bits == scene.output.bits, "a PNG needs a developed frame of the depth the scene asks for");
+	require(frame.layer_count == 1 && frame.layer[0] == LAYER_COLOR, "a PNG holds the layer color alone");
+
+	const TypeDesc type = bits == 8 ? TypeDesc::UINT8 : TypeDesc::UINT16;
+	ImageSpec spec(frame.width, frame.height, 3, type);
+	spec.attribute("oiio:ColorSpace", "sRGB");
+	spec.attribute("Software", metadata.software);
+	const bool small = scene.output.png_compression == PNG_SMALL;
+	/* Dithered differences hold few repeats: run lengths and Huffman codes alone beat zlib's quick levels in time and size. Level
+	 * 9 takes eight times as long as 6 for a twentieth less. */
+	spec.attribute("png:filter", png_filter_sub);
+	spec.attribute("compression", small ? "filtered" : "rle");
+	spec.attribute("png:compressionLevel", small ? 6 : 1);
+
+	OIIO::Filesystem::IOVecOutput proxy;
+	proxy.buffer().reserve(frame.bytes / 2);
+	auto out = open_output("png", spec, &proxy);
+	if (!out->write_image(type, frame.pixels))
+		throw std::runtime_error(out->geterror());
+	close_output(*out);
+	png_insert_text(proxy.buffer(), "stratus:scene", metadata.scene_json);
+	return std::move(proxy.buffer());
+}
+
+/* --- EXR ------------------------------------------------------------------------------------------------------------------ */
+
+struct channel {
+	std::string name;
+	const float *first; /* of the plane's pixels; the next one is frame.channels further */
+	bool is_half;
+};
+
+/* Names that compositors group: R, G, B for color, NAME.R .G .B for the others; depth is Z and a plain quantity Y. */
+std::vector<std::string> channel_names(enum layer layer)
+{
+	const std::string prefix = layer == LAYER_COLOR ? "" : std::string(scene_layer_names[layer]) + ".";
+	if (layer == LAYER_DISTANCE)
+		return {prefix + "Z"};
+	if (layer == LAYER_OPTICAL_THICKNESS)
+		return {prefix + "Y"};
+	return {prefix + "R", prefix + "G", prefix + "B"};
+}
+
+/* The largest magnitude of a channel; refuses what is not finite, since it would spread through any later filter. */
+float channel_peak(const struct frame &frame, const struct channel &channel)
+{
+	const size_t count = static_cast<size_t>(frame.width) * frame.height;
+	float peak = 0, poison = 0;
+	for (size_t i = 0; i < count; i++) {
+		const float value = channel.first[i * frame.channels];
+		peak = std::max(peak, std::fabs(value));
+		poison += value * 0.0f; /* NaN from the first inf or NaN on */
+	}
+	if (!(poison == 0.0f))
+		throw std::runtime_error("channel " + channel.name + " holds a value that is not finite");
+	return peak;
+}
+
+std::vector<channel> choose_channels(const struct frame &frame, enum exr_type type, bool &clamped)
+{
+	std::vector<channel> channels;
+	const size_t plane = static_cast<size_t>(frame.width) * frame.height * frame.channels;
+	for (int i = 0; i < frame.layer_count; i++) {
+		int component = 0;
+		for (const std::string &name : channel_names(frame.layer[i])) {
+			channel added = {name, static_cast<const float *>(frame.pixels) + i * plane + component++, type != EXR_FLOAT};
+			const bool too_large = channel_peak(frame, added) > half_max;
+			if (type == EXR_AUTO && too_large)
+				added.is_half = false;
+			clamped = clamped || (type == EXR_HALF && too_large);
+			channels.push_back(added);
+		}
+	}
+	return channels;
+}
+
+/* From the file's world (+X east, +Y up, +Z south) to EXR's camera space (left-handed, +x right, +y up, +z view), as Imath has
+ * it: row vectors, point * matrix. */
+void camera_matrix(const struct scene_camera &camera, float matrix[16])
+{
+	const double degree = M_PI / 180;
+	const double az = camera.azimuth_deg * degree, el = camera.elevation_deg * degree, roll = camera.roll_deg * degree;
+	/* east, north, up; the camera turns against the clock where the picture is to turn with it */
+	const double view[3] = {std::sin(az) * std::cos(el), std::cos(az) * std::cos(el), std::sin(el)};
+	const double level_right[3] = {std::cos(az), -std::sin(az), 0};
+	const double level_up[3] = {-std::sin(az) * std::sin(el), -std::cos(az) * std::sin(el), std::cos(el)};
+	double axes[3][3];
+	for (int i = 0; i < 3; i++) {
+		axes[0][i] = std::cos(roll) * level_right[i] + std::sin(roll) * level_up[i];
+		axes[1][i] = std::cos(roll) * level_up[i] - std::sin(roll) * level_right[i];
+		axes[2][i] = view[i];
+	}
+	for (int axis = 0; axis < 3; axis++) {
+		const double *a = axes[axis];
+		const double *p = camera.position_m;
+		matrix[0 * 4 + axis] = static_cast<float>(a[0]);
+		matrix[1 * 4 + axis] = static_cast<float>(a[2]);
+		matrix[2 * 4 + axis] = static_cast<float>(-a[1]);
+		matrix[3 * 4 + axis] = static_cast<float>(-(a[0] * p[0] + a[1] * p[1] + a[2] * p[2]));
+		matrix[axis * 4 + 3] = 0;
+	}
+	matrix[15] = 1;
+}
+
+void describe_projection(ImageSpec &spec, const struct scene &scene)
+{
+	switch (scene.camera.projection) {
+	case PROJECTION_PERSPECTIVE: {
+		float matrix[16];
+		camera_matrix(scene.camera, matrix);
+		spec.attribute("worldtocamera", OIIO::TypeMatrix44, matrix);
+		const double height = 2 * std::tan(scene.camera.vertical_fov_deg * M_PI / 360);
+		spec.attribute("screenWindowWidth", static_cast<float>(height * spec.width / spec.height));
+		break;
+	}
+	case PROJECTION_EQUIRECTANGULAR:
+		spec.attribute("textureformat", "LatLong Environment");
+		spec.attribute("openexr:levelmode", 0); /* one level: scan lines, no pyramid */
+		break;
+	case PROJECTION_CUBEMAP:
+		spec.attribute("textureformat", "CubeFace Environment");
+		spec.attribute("openexr:levelmode", 0);
+		break;
+	case PROJECTION_FISHEYE: /* EXR has no word for it; the scene says it */
+	case PROJECTION_COUNT:
+		break;
+	}
+}
+
+ImageSpec exr_spec(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata,
+		   const std::vector<channel> &channels, bool clamped)
+{
+	ImageSpec spec(frame.width, frame.height, static_cast<int>(channels.size()), TypeDesc::FLOAT);
+	spec.channelnames.clear();
+	for (const channel &channel : channels) {
+		spec.channelnames.push_back(channel.name);
+		spec.channelformats.push_back(channel.is_half ? TypeDesc::HALF : TypeDesc::FLOAT);
+	}
+	const float rec709_d65[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
+	spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), rec709_d65);
+	spec.attribute("whiteLuminance", 1000.0f); /* cd/m2 of (1,1,1) */
+	spec.attribute("compression", scene_exr_compression_names[scene.output.exr_compression]);
+	spec.attribute("software", metadata.software);
+	/* OpenImageIO adds the date unless there is one; one that is no text keeps it out and is itself not written. */
+	spec.attribute("DateTime", 0);
+	describe_projection(spec, scene);
+	spec.attribute("stratus:scene", metadata.scene_json);
+	spec.attribute("stratus:exposure_ev", static_cast<float>(frame.exposure_ev));
+	spec.attribute("stratus:global_illuminance_lux", static_cast<float>(frame.global_illuminance_lux));
+	spec.attribute("stratus:direct_illuminance_lux", static_cast<float>(frame.direct_illuminance_lux));
+	spec.attribute("stratus:diffuse_illuminance_lux", static_cast<float>(frame.diffuse_illuminance_lux));
+	if (clamped)
+		spec.attribute("stratus:clamped_to", half_max);
+	return spec;
+}
+
+/* Rows y..y_end as the file has them: pixel by pixel, each channel in its own type. */
+void pack_rows(const struct frame &frame, const std::vector<channel> &channels, int y, int y_end, bytes &packed)
+{
+	size_t pixel_bytes = 0;
+	for (const channel &channel : channels)
+		pixel_bytes += channel.is_half ? 2 : 4;
+	const size_t first = static_cast<size_t>(y) * frame.width, count = static_cast<size_t>(y_end - y) * frame.width;
+	packed.resize(pixel_bytes * count);
+
+	size_t offset = 0;
+	for (const channel &channel : channels) {
+		const float *from = channel.first + first * frame.channels;
+		unsigned char *to = packed.data() + offset;
+		for (size_t i = 0; i < count; i++, from += frame.channels, to += pixel_bytes) {
+			if (channel.is_half) {
+				const half value(std::min(std::max(*from, -half_max), half_max));
+				std::memcpy(to, &value, 2);
+			} else {
+				std::memcpy(to, from, 4);
+			}
+		}
+		offset += channel.is_half ? 2 : 4;
+	}
+}
+
+bytes encode_exr(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata)
+{
+	require(frame.type == PIXEL_F32, "an EXR needs a scene-linear frame");
+	bool clamped = false;
+	const std::vector<channel> channels = choose_channels(frame, scene.output.exr_type, clamped);
+
+	OIIO::Filesystem::IOVecOutput proxy;
+	auto out = open_output("exr", exr_spec(frame, scene, metadata, channels, clamped), &proxy);
+	bytes rows;
+	constexpr int rows_at_once = 64; /* a multiple of every compressor's block, at most 32 lines */
+	for (int y = 0; y < frame.height; y += rows_at_once) {
+		const int y_end = std::min(y + rows_at_once, frame.height);
+		pack_rows(frame, channels, y, y_end, rows);
+		if (!out->write_scanlines(y, y_end, 0, TypeDesc::UNKNOWN, rows.data()))
+			throw std::runtime_error(out->geterror());
+	}
+	close_output(*out);
+	return std::move(proxy.buffer());
+}
+
+/* --- the door to C -------------------------------------------------------------------------------------------------------- */
+
+void check_frame(const struct frame &frame)
+{
+	static const size_t sample_bytes[] = {1, 2, 4};
+	require(frame.width >= 1 && frame.height >= 1 && frame.channels == 3, "the frame has no RGB pixels");
+	require(frame.layer_count >= 1 && frame.layer_count <= LAYER_COUNT, "the frame has no layers");
+	const size_t needed = sample_bytes[frame.type] * 3 * frame.width * frame.height * frame.layer_count;
+	require(frame.pixels && frame.bytes >= needed, "the frame holds fewer pixels than its size says");
+}
+
+bool encode(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata, struct image_buffer *buffer,
+	    char *error, size_t error_size) noexcept
+{
+	*buffer = {};
+	try {
+		check_frame(*frame);
+		const bytes file =
+			scene->output.format == IMAGE_PNG ? encode_png(*frame, *scene, *metadata) : encode_exr(*frame, *scene, *metadata);
+		buffer->data = static_cast<unsigned char *>(std::malloc(file.size()));
+		require(buffer->data, "out of memory");
+		std::memcpy(buffer->data, file.data(), file.size());
+		buffer->size = file.size();
+		return true;
+	} catch (const std::exception &failure) {
+		std::snprintf(error, error_size, "%s", failure.what());
+	} catch (...) {
+		std::snprintf(error, error_size, "unknown failure of the image library");
+	}
+	return false;
+}
+
+const struct image_api api = {encode};
+
+} // namespace
+
+/* One encode stays on one thread: several run at once beside the renderer, and would only take turns. */
+extern "C" const struct image_api *stratus_image_api(void)
+{
+	static std::once_flag once;
+	std::call_once(once, [] {
+		OIIO::attribute("threads", 1);
+		OIIO::attribute("exr_threads", -1);
+		OIIO::attribute("debug", 0); /* no lines on standard error that are not ours */
+	});
+	return &api;
+}

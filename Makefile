@@ -49,14 +49,20 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/uni
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
-# The Mie kernel table does not depend on sanitizers: always made by the plain program, once.
+# The Mie kernel table does not depend on sanitizers: always made by the plain program, anew when what it says has changed.
 kernel: build/mie.kernel
-KERNEL_SRC := renderer/programs/kernel.c $(wildcard renderer/optics/mie*.c renderer/optics/kernel*.c) renderer/optics/quadrature.c renderer/log.c
-build/mie.kernel: | build/stratus-kernel
+MIE_SRC := $(wildcard renderer/optics/mie*.c renderer/optics/kernel*.c) renderer/optics/quadrature.c
+KERNEL_SRC := renderer/programs/kernel.c $(MIE_SRC) renderer/log.c
+ifeq ($(SAN),)
+build/mie.kernel: $(MIE_SRC) renderer/optics/kernel_table.h | build/stratus-kernel
 	build/stratus-kernel -o $@
-build/stratus-kernel: $(KERNEL_SRC:%=build/%.o)
+else
+build/mie.kernel:
+	$(MAKE) --no-print-directory SAN= $@
+endif
+$(B)/stratus-kernel: $(call obj,$(KERNEL_SRC))
 	@mkdir -p $(@D)
-	$(CC) -pthread $^ -o $@ -lm
+	$(CC) $(LDFLAGS) $^ -o $@ -lm
 
 $(B)/librenderer.a: $(RENDERER_OBJ)
 	rm -f $@; ar rcs $@ $^

@@ -30,7 +30,7 @@ struct forward_tables {
 /* Beyond this angle (radians) `peak` is taken as 0. */
 #define FORWARD_ANGLE_MAX 0.6
 
-/* Fills the tables; some ten milliseconds; any thread. */
+/* Fills the tables, never below 0; 1 to 10 ms, most for the smallest and the largest droplets; takes 0.5 MB of stack; any thread. */
 void forward_tables_compute(const struct optics *optics, struct forward_tables *tables);
 
 #endif

@@ -20,7 +20,8 @@ void kernel_destroy(struct kernel *kernel);
 typedef void kernel_progress(void *context, double done);
 
 /* Computes the table on `threads` threads (0: all processors) and writes it to path atomically (temporary file, fsync, rename).
- * Some 10 s on two cores. progress may be NULL. false (and a log line) when the file cannot be written. */
+ * Some 5 s on two cores. The content does not depend on the number of threads. progress may be NULL. false (and a log line) when the file
+ * cannot be written. */
 bool kernel_generate(const char *path, int threads, kernel_progress *progress, void *context);
 
 /* Hash of the table's content, for keys of what is derived from it. */

@@ -16,14 +16,16 @@ struct paper_fit {
 /* Fractions of the incident flux. Index 3 stands for three and more scatterings; r[0] is 0. */
 struct paper_orders {
 	double t[4], r[4];
-	double t_total, r_total; /* T_ms and R_ms = 1 - T_ms */
+	double t_total, r_total; /* T_ms, but at least t[0], and 1 - t_total */
 };
 
 /* Parameters at an incidence, interpolated between the rows of appendix B. zenith_rad 0..pi/2. Any thread. */
 struct paper_fit paper_fit_at(double zenith_rad);
 
 /* Orders of scattering. thickness_m: H >= 0 of the paper's distribution (by similarity: H kappa / PAPER_EXTINCTION_PER_M);
- * slant_depth_modified: kappa_S H / mu_l, so that T_0 = exp(-slant_depth_modified). Never negative, never NaN. Any thread. */
+ * slant_depth_modified: kappa_S H / mu_l >= 0 (infinity is fine), so that T_0 = exp(-slant_depth_modified). Any thread.
+ * Never negative, and all orders of both sides add up to 1. The fits alone do not see to that in thin layers (R1 + R2 is up to 40 % above
+ * R_ms at 80 degrees): where orders 1 and 2 exceed what the total leaves them they are scaled down to it and 3+ is 0. */
 struct paper_orders paper_orders_at(const struct paper_fit *fit, double thickness_m, double slant_depth_modified);
 
 /* Total transmittance T_ms alone, 0..1. */

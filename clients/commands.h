@@ -1,0 +1,11 @@
+/* The subcommands, one file each. */
+#ifndef STRATUS_CLIENTS_COMMANDS_H
+#define STRATUS_CLIENTS_COMMANDS_H
+
+#include "clients/client.h"
+
+extern const struct command command_render;
+extern const struct command command_presets;
+extern const struct command command_health;
+
+#endif

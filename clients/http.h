@@ -1,0 +1,30 @@
+/* One request to the daemon and its whole answer in memory, over libcurl. */
+#ifndef STRATUS_CLIENTS_HTTP_H
+#define STRATUS_CLIENTS_HTTP_H
+
+#include "clients/client.h"
+
+#include <stddef.h>
+
+struct http_request {
+	const char *path; /* from the root, "/v1/render" */
+	const char *json; /* body of a POST; NULL: GET */
+};
+
+struct http_response {
+	long status;
+	char *content_type;  /* "" when there is none */
+	char *server_timing; /* all Server-Timing headers, joined by commas */
+	char *request_id;
+	char *body; /* size bytes, then a NUL */
+	size_t size;
+	double seconds; /* from the start of the connection to the last byte */
+};
+
+/* CLIENT_OK with any status the server chose, or CLIENT_UNREACHABLE after a message. http_response_finish in either case. */
+int http_send(const struct client *client, const struct http_request *request, struct http_response *response);
+
+/* Takes a zeroed response. */
+void http_response_finish(struct http_response *response);
+
+#endif

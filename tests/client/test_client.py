@@ -1,0 +1,270 @@
+"""The command line client against a server of our own, so that every kind of answer can be had."""
+
+import http.server
+import json
+import os
+import pathlib
+import stat
+import subprocess
+import threading
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = ROOT / os.environ.get("STRATUS_BUILD", "build")
+IMAGE = b"\x89PNG not really" * 1000
+PRESETS = {"noon": {"sun": {"elevation_deg": 60}}, "dusk": {"sun": {"elevation_deg": 2}}}
+PROBLEM = {
+    "type": "about:blank",
+    "title": "The scene is refused",
+    "status": 422,
+    "detail": "2 members are wrong\x1b[31m",
+    "errors": [{"pointer": "/sun/elevation_deg", "detail": "above 90"}, {"pointer": "/moon", "detail": "unknown"}],
+}
+
+
+class Handler(http.server.BaseHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+    def answer(self, status, kind, body, headers=()):
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        for name, value in headers:
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
+
+    def do_GET(self):
+        self.server.seen.append(self)
+        if self.path == "/v1/presets":
+            self.answer(200, "application/json", json.dumps(PRESETS).encode())
+        else:
+            self.answer(self.server.health, "text/plain", b"words\n")
+
+    def do_POST(self):
+        self.body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        self.server.seen.append(self)
+        self.server.reply(self)
+
+
+def image(handler):
+    timing = 'queue;dur=0.41, optics;desc="reused";dur=0.1,view;dur=12.5;other=7, total;dur=20.25'
+    handler.answer(200, "image/png", IMAGE, [("Server-Timing", timing), ("Server-Timing", "late;dur=1")])
+
+
+def problem(handler):
+    handler.answer(422, "application/problem+json", json.dumps(PROBLEM).encode())
+
+
+@pytest.fixture
+def server():
+    daemon = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    daemon.seen, daemon.health, daemon.reply = [], 200, image
+    thread = threading.Thread(target=daemon.serve_forever, args=(0.01,))
+    thread.start()
+    yield daemon
+    daemon.shutdown()
+    daemon.server_close()
+    thread.join()
+
+
+def stratus(server, *arguments, **keywords):
+    url = f"http://127.0.0.1:{server.server_port}" if server else "http://127.0.0.1:9"
+    environment = {**os.environ, "STRATUS_SERVER": url}
+    return subprocess.run([BUILD / "stratus", *map(str, arguments)], env=environment, capture_output=True, timeout=60, **keywords)
+
+
+def test_empty_scene(server, tmp_path):
+    done = stratus(server, "render", "-o", tmp_path / "sky.PNG")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "sky.PNG").read_bytes() == IMAGE
+    assert server.seen[0].path == "/v1/render"
+    assert server.seen[0].body == {"output": {"format": "png"}}
+    assert os.listdir(tmp_path) == ["sky.PNG"]
+
+
+def test_timing_table(server, tmp_path):
+    lines = stratus(server, "render", "-o", tmp_path / "a.png").stderr.decode().splitlines()
+    rows = [line.split() for line in lines]
+    assert rows[0] == ["stage", "ms"]
+    assert rows[1:6] == [["queue", "0.41"], ["optics", "0.10", "reused"], ["view", "12.50"], ["total", "20.25"], ["late", "1.00"]]
+    assert rows[6][0] == "client" and rows[6][2:] == [str(len(IMAGE)), "bytes"]
+
+
+def test_quiet(server, tmp_path):
+    done = stratus(server, "render", "-q", "-o", tmp_path / "a.png")
+    assert (done.stdout, done.stderr) == (b"", b"")
+
+
+@pytest.mark.parametrize("name, format", [("a.exr", "exr"), ("a.EXR", "exr"), ("a.png", "png"), ("a.dat", None)])
+def test_format_follows_extension(server, tmp_path, name, format):
+    stratus(server, "render", "-o", tmp_path / name)
+    assert server.seen[0].body == ({"output": {"format": format}} if format else {})
+
+
+def test_scene_keeps_its_format(server, tmp_path):
+    (tmp_path / "scene.json").write_text('{"output": {"format": "exr", "width": 64}}')
+    stratus(server, "render", tmp_path / "scene.json", "-o", tmp_path / "a.png")
+    assert server.seen[0].body == {"output": {"format": "exr", "width": 64}}
+
+
+def test_standard_input_and_output(server):
+    done = stratus(server, "render", "-", "-o", "-", input=b'{"sun": {"elevation_deg": 5}}')
+    assert done.stdout == IMAGE
+    assert server.seen[0].body == {"sun": {"elevation_deg": 5}}
+
+
+def test_set(server, tmp_path):
+    sets = ["sun.elevation_deg=10", "camera.position_m=[0, 0, 3000]", "ground.type=snow", "radiosity.enabled=false", "sun.elevation_deg=11"]
+    arguments = [part for one in sets for part in ("--set", one)]
+    assert stratus(server, "render", *arguments, "-o", tmp_path / "a").returncode == 0
+    assert server.seen[0].body == {
+        "sun": {"elevation_deg": 11},
+        "camera": {"position_m": [0, 0, 3000]},
+        "ground": {"type": "snow"},
+        "radiosity": {"enabled": False},
+    }
+
+
+@pytest.mark.parametrize("text", ["sun", "=1", "sun.=1", ".sun=1"])
+def test_set_wants_an_assignment(server, tmp_path, text):
+    done = stratus(server, "render", "--set", text, "-o", tmp_path / "a.png")
+    assert done.returncode == 2 and b"member=value" in done.stderr
+    assert not server.seen
+
+
+def test_set_through_a_value(server, tmp_path):
+    done = stratus(server, "render", "--set", "sun=1", "--set", "sun.elevation_deg=1", "-o", tmp_path / "a.png")
+    assert done.returncode == 2 and b"in the way" in done.stderr
+
+
+def test_preset(server, tmp_path):
+    done = stratus(server, "render", "--preset", "dusk", "--set", "sun.azimuth_deg=9", "-o", tmp_path / "a.png")
+    assert done.returncode == 0
+    assert server.seen[1].body == {"sun": {"elevation_deg": 2, "azimuth_deg": 9}, "output": {"format": "png"}}
+
+
+def test_unknown_preset(server, tmp_path):
+    done = stratus(server, "render", "--preset", "night", "-o", tmp_path / "a.png")
+    assert done.returncode == 2 and b"night" in done.stderr
+
+
+def test_presets(server):
+    assert stratus(server, "presets").stdout.decode().split() == list(PRESETS)
+    assert json.loads(stratus(server, "presets", "noon").stdout) == PRESETS["noon"]
+    assert stratus(server, "presets", "night").returncode == 2
+
+
+def test_refusal_names_every_member_and_writes_nothing(server, tmp_path):
+    server.reply = problem
+    (tmp_path / "a.png").write_bytes(b"old")
+    done = stratus(server, "render", "-o", tmp_path / "a.png")
+    text = done.stderr.decode()
+    assert done.returncode == 1
+    assert "422 The scene is refused" in text and "2 members are wrong" in text
+    assert "  /sun/elevation_deg: above 90\n" in text and "  /moon: unknown\n" in text
+    assert "\x1b" not in text
+    assert (tmp_path / "a.png").read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.png"]
+
+
+def test_failure_without_words(server, tmp_path):
+    server.reply = lambda handler: handler.answer(502, "text/html", b"<html>", [("X-Request-Id", "abc")])
+    done = stratus(server, "render", "-o", tmp_path / "a.png")
+    assert done.returncode == 1 and b"502" in done.stderr and b"abc" in done.stderr
+
+
+def test_answer_that_is_no_image(server, tmp_path):
+    server.reply = lambda handler: handler.answer(200, "text/html", b"<html>")
+    done = stratus(server, "render", "-o", tmp_path / "a.png")
+    assert done.returncode == 1 and b"text/html" in done.stderr
+    assert not os.listdir(tmp_path)
+
+
+def test_broken_answer(server, tmp_path):
+    def cut(handler):
+        handler.send_response(200)
+        handler.send_header("Content-Type", "image/png")
+        handler.send_header("Content-Length", "1000")
+        handler.end_headers()
+        handler.wfile.write(b"half")
+
+    server.reply = cut
+    done = stratus(server, "render", "-o", tmp_path / "a.png")
+    assert done.returncode == 3
+    assert not os.listdir(tmp_path)
+
+
+def test_no_server(tmp_path):
+    done = stratus(None, "render", "-o", tmp_path / "a.png")
+    assert done.returncode == 3 and b"127.0.0.1:9" in done.stderr
+
+
+@pytest.mark.parametrize("place", ["before", "after"])
+def test_server_option_wins(server, tmp_path, place):
+    option = ["--server", f"http://127.0.0.1:{server.server_port}/"]
+    command = ["render", "-o", str(tmp_path / "a.png")]
+    assert stratus(None, *(option + command if place == "before" else command + option)).returncode == 0
+
+
+def test_timeout_is_passed_on(server, tmp_path):
+    stratus(server, "render", "--timeout", "2.5", "-o", tmp_path / "a.png")
+    assert server.seen[0].headers["X-Timeout-Ms"] == "2500"
+    assert stratus(server, "render", "--timeout", "soon", "-o", tmp_path / "a.png").returncode == 2
+
+
+def test_unwritable(server, tmp_path):
+    done = stratus(server, "render", "-o", tmp_path / "nowhere" / "a.png")
+    assert done.returncode == 4 and b"nowhere" in done.stderr
+    assert stratus(server, "render", "-o", "/dev/full").returncode == 4
+    assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
+
+
+def test_replaces_a_file_through_its_link(server, tmp_path):
+    (tmp_path / "real.png").write_bytes(b"old")
+    os.chmod(tmp_path / "real.png", 0o640)
+    (tmp_path / "link.png").symlink_to("real.png")
+    assert stratus(server, "render", "-o", tmp_path / "link.png").returncode == 0
+    assert (tmp_path / "link.png").is_symlink()
+    assert (tmp_path / "real.png").read_bytes() == IMAGE
+    assert stat.S_IMODE(os.stat(tmp_path / "real.png").st_mode) == 0o640
+
+
+def test_new_file_obeys_umask(server, tmp_path):
+    stratus(server, "render", "-o", tmp_path / "a.png", preexec_fn=lambda: os.umask(0o027))
+    assert stat.S_IMODE(os.stat(tmp_path / "a.png").st_mode) == 0o640
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["paint"], ["render"], ["render", "a.json", "b.json", "-o", "c.png"], ["render", "--what"], ["render", "/nonexistent.json", "-o", "c.png"],
+     ["render", "a.json", "--preset", "noon", "-o", "c.png"], ["presets", "a", "b"]],
+)  # fmt: skip
+def test_bad_usage(server, arguments):
+    done = stratus(server, *arguments)
+    assert done.returncode == 2 and done.stderr
+    assert not server.seen
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"a": 1, "a": 2}', "{'a': 1}"])
+def test_bad_scene_file(server, tmp_path, text):
+    (tmp_path / "scene.json").write_text(text)
+    done = stratus(server, "render", tmp_path / "scene.json", "-o", tmp_path / "a.png")
+    assert done.returncode == 2 and b"scene.json" in done.stderr
+
+
+def test_help_and_version(server):
+    assert b"render" in stratus(server, "--help").stdout
+    assert b"--preset" in stratus(server, "render", "--help").stdout
+    assert stratus(server, "--version").stdout.startswith(b"stratus ")
+
+
+def test_health(server):
+    done = stratus(server, "health")
+    assert done.returncode == 0 and done.stdout == b"/healthz 200\n"
+    server.health = 503
+    done = stratus(server, "health", "--ready", "-q")
+    assert done.returncode == 1 and done.stdout == b"" and server.seen[-1].path == "/readyz"
+    assert stratus(None, "health").returncode == 3

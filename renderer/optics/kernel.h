@@ -1,7 +1,7 @@
 /* The kernel table: extinction and scattered intensity of a sphere of water over size parameter and angle, for the three bands.
  *
  * Summing Mie series for each droplet size distribution would cost seconds to minutes. The scattering functions depend on size parameter
- * x = 2 pi r / lambda and refractive index alone, so they are computed once, on a fine grid of x (step max(0.05, x/4000), finer for small
+ * x = 2 pi r / lambda and refractive index alone, so they are computed once, on a fine grid of x (step max(0.02, x/4000), finer for small
  * x), averaged into bins with hat functions in ln x, and kept on disk. A distribution is then a weighted sum over bins.
  */
 #ifndef STRATUS_RENDERER_OPTICS_KERNEL_H

@@ -1,0 +1,117 @@
+#include "renderer/cache.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct entry {
+	struct entry *next; /* most recently used first */
+	struct cache_key key;
+	void *value;
+	size_t bytes;
+	void (*destroy)(void *value);
+	unsigned long frame; /* last one that used it */
+};
+
+/* A few dozen entries at most: a list is searched faster than the key could be hashed. */
+struct cache {
+	struct entry *first;
+	size_t bound, bytes;
+	unsigned long frame;
+};
+
+struct cache_key cache_key_make(const char *name)
+{
+	struct cache_key key = {.length = strlen(name) + 1};
+	memcpy(key.bytes, name, key.length);
+	return key;
+}
+
+void cache_key_add(struct cache_key *key, double number)
+{
+	/* A key that is too long is our bug; the abort is better than two scenes sharing one result. */
+	if (key->length + sizeof number > CACHE_KEY_MAX)
+		abort();
+	number += 0.0; /* -0 becomes 0 */
+	memcpy(key->bytes + key->length, &number, sizeof number);
+	key->length += sizeof number;
+}
+
+struct cache *cache_create(size_t bound)
+{
+	struct cache *cache = calloc(1, sizeof *cache);
+	if (cache)
+		cache->bound = bound;
+	return cache;
+}
+
+static void drop(struct cache *cache, struct entry **link)
+{
+	struct entry *entry = *link;
+	*link = entry->next;
+	cache->bytes -= entry->bytes;
+	entry->destroy(entry->value);
+	free(entry);
+}
+
+void cache_destroy(struct cache *cache)
+{
+	if (!cache)
+		return;
+	while (cache->first)
+		drop(cache, &cache->first);
+	free(cache);
+}
+
+static void shrink(struct cache *cache)
+{
+	while (cache->bytes > cache->bound) {
+		struct entry **oldest = NULL;
+		for (struct entry **link = &cache->first; *link; link = &(*link)->next)
+			if ((*link)->frame != cache->frame)
+				oldest = link;
+		if (!oldest)
+			return;
+		drop(cache, oldest);
+	}
+}
+
+void cache_begin_frame(struct cache *cache)
+{
+	cache->frame++;
+	shrink(cache);
+}
+
+void *cache_find(struct cache *cache, const struct cache_key *key)
+{
+	for (struct entry **link = &cache->first; *link; link = &(*link)->next) {
+		struct entry *entry = *link;
+		if (entry->key.length != key->length || memcmp(entry->key.bytes, key->bytes, key->length) != 0)
+			continue;
+		*link = entry->next;
+		entry->next = cache->first;
+		cache->first = entry;
+		entry->frame = cache->frame;
+		return entry->value;
+	}
+	return NULL;
+}
+
+bool cache_keep(struct cache *cache, const struct cache_key *key, void *value, size_t bytes, void (*destroy)(void *value))
+{
+	struct entry *entry = calloc(1, sizeof *entry);
+	if (!entry) {
+		destroy(value);
+		return false;
+	}
+	*entry = (struct entry){
+		.next = cache->first, .key = *key, .value = value, .bytes = bytes, .destroy = destroy, .frame = cache->frame};
+	cache->first = entry;
+	cache->bytes += bytes;
+	shrink(cache);
+	return true;
+}
+
+size_t cache_bytes(const struct cache *cache)
+{
+	return cache->bytes;
+}

@@ -1,0 +1,209 @@
+#include "renderer/gl/pass.h"
+
+#include "renderer/gl/source.h"
+#include "renderer/log.h"
+
+#include <epoxy/gl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Side of a compute work group: 64 invocations, within the 1024 that OpenGL 4.5 guarantees. */
+enum { GROUP_SIDE = 8 };
+
+struct pass {
+	GLuint program;
+	GLuint framebuffer, vertex_array; /* fragment passes alone */
+	int outputs;
+	bool compute;
+	GLint arguments, size;
+	char name[64];
+};
+
+static const char vertex_text[] =
+	"#version 450 core\n"
+	"void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }\n";
+
+static void append_fragment_wrapper(struct source *source, int outputs)
+{
+	source_print(source, "#define STORE(i, value) output_##i = (value)\n");
+	for (int i = 0; i < outputs; i++)
+		source_print(source, "layout(location = %d) out vec4 output_%d;\n", i, i);
+	source_print(source, "void pass(ivec2 pixel);\nvoid main() { pass(ivec2(gl_FragCoord.xy)); }\n");
+}
+
+static void append_compute_wrapper(struct source *source, int outputs)
+{
+	source_print(source, "layout(local_size_x = %d, local_size_y = %d) in;\n", GROUP_SIDE, GROUP_SIDE);
+	source_print(source, "uniform ivec2 pass_size;\n");
+	source_print(source, "#define STORE(i, value) imageStore(output_##i, ivec2(gl_GlobalInvocationID.xy), value)\n");
+	for (int i = 0; i < outputs; i++)
+		source_print(source, "layout(binding = %d) writeonly uniform image2D output_%d;\n", i, i);
+	source_print(source, "void pass(ivec2 pixel);\nvoid main() {\n"
+			     "\tivec2 pixel = ivec2(gl_GlobalInvocationID.xy);\n"
+			     "\tif (all(lessThan(pixel, pass_size))) pass(pixel);\n}\n");
+}
+
+static bool assemble(struct source *source, const struct pass_compiler *compiler, const struct pass_desc *desc, bool compute)
+{
+	source_print(source, "#version 450 core\n#define %s 1\n", compute ? "PASS_COMPUTE" : "PASS_FRAGMENT");
+	if (desc->defines)
+		source_print(source, "%s", desc->defines);
+	if (compute)
+		append_compute_wrapper(source, desc->outputs);
+	else
+		append_fragment_wrapper(source, desc->outputs);
+	return source_include(source, compiler->shader_dir, desc->file);
+}
+
+/* The info log is read whether or not it failed: warnings belong into the log too. */
+static bool report(const char *what, const char *name, GLint ok, const char *text)
+{
+	const size_t length = strcspn(text, "\0");
+	if (length > 0)
+		log_line(ok ? LOG_WARNING : LOG_ERROR, "gl: %s %s: %s", what, name, text);
+	else if (!ok)
+		log_error("gl: %s %s failed without a message", what, name);
+	return ok;
+}
+
+static GLuint compile(GLenum type, const char *text, const char *name)
+{
+	char message[4096] = "";
+	GLint ok = 0;
+	const GLuint shader = glCreateShader(type);
+	glShaderSource(shader, 1, &text, NULL);
+	glCompileShader(shader);
+	glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
+	glGetShaderInfoLog(shader, sizeof message, NULL, message);
+	if (!report("compiling", name, ok, message)) {
+		glDeleteShader(shader);
+		return 0;
+	}
+	return shader;
+}
+
+static bool link(struct pass *pass, const char *text)
+{
+	char message[4096] = "";
+	GLint ok = 0;
+	GLuint shaders[2] = {0};
+	if (pass->compute) {
+		shaders[0] = compile(GL_COMPUTE_SHADER, text, pass->name);
+	} else {
+		shaders[0] = compile(GL_FRAGMENT_SHADER, text, pass->name);
+		shaders[1] = compile(GL_VERTEX_SHADER, vertex_text, "vertex");
+	}
+	if (shaders[0] && (pass->compute || shaders[1])) {
+		pass->program = glCreateProgram();
+		for (int i = 0; i < 2 && shaders[i]; i++)
+			glAttachShader(pass->program, shaders[i]);
+		glLinkProgram(pass->program);
+		glGetProgramiv(pass->program, GL_LINK_STATUS, &ok);
+		glGetProgramInfoLog(pass->program, sizeof message, NULL, message);
+		ok = report("linking", pass->name, ok, message);
+	}
+	for (int i = 0; i < 2; i++)
+		if (shaders[i])
+			glDeleteShader(shaders[i]);
+	return ok;
+}
+
+static void look_up_uniforms(struct pass *pass, const struct pass_desc *desc)
+{
+	pass->arguments = glGetUniformLocation(pass->program, "arguments");
+	pass->size = glGetUniformLocation(pass->program, "pass_size");
+	for (int i = 0; i < PASS_SAMPLERS_MAX && desc->samplers[i]; i++) {
+		/* -1, a sampler that the compiler found unused, is ignored by OpenGL. */
+		glProgramUniform1i(pass->program, glGetUniformLocation(pass->program, desc->samplers[i]), i);
+	}
+}
+
+struct pass *pass_create(const struct pass_compiler *compiler, const struct pass_desc *desc)
+{
+	struct source source = {0};
+	struct pass *pass = calloc(1, sizeof *pass);
+	if (!pass)
+		return NULL;
+	snprintf(pass->name, sizeof pass->name, "%s", desc->file);
+	pass->outputs = desc->outputs;
+	pass->compute = compiler->kind == PASS_COMPUTE || desc->outputs == 0;
+	if (!assemble(&source, compiler, desc, pass->compute) || !link(pass, source.text))
+		goto fail;
+	look_up_uniforms(pass, desc);
+	if (!pass->compute) {
+		glCreateFramebuffers(1, &pass->framebuffer);
+		glCreateVertexArrays(1, &pass->vertex_array);
+	}
+	source_finish(&source);
+	return pass;
+
+fail:
+	source_finish(&source);
+	pass_destroy(pass);
+	return NULL;
+}
+
+void pass_destroy(struct pass *pass)
+{
+	if (!pass)
+		return;
+	if (pass->vertex_array)
+		glDeleteVertexArrays(1, &pass->vertex_array);
+	if (pass->framebuffer)
+		glDeleteFramebuffers(1, &pass->framebuffer);
+	if (pass->program)
+		glDeleteProgram(pass->program);
+	free(pass);
+}
+
+static void run_compute(const struct pass *pass, const struct pass_run *run, int width, int height)
+{
+	for (int i = 0; i < pass->outputs; i++)
+		glBindImageTexture((GLuint)i, run->targets[i]->id, run->level, GL_FALSE, 0, GL_WRITE_ONLY,
+				   texture_internal_format(run->targets[i]->format));
+	glProgramUniform2i(pass->program, pass->size, width, height);
+	glDispatchCompute((GLuint)(width + GROUP_SIDE - 1) / GROUP_SIDE, (GLuint)(height + GROUP_SIDE - 1) / GROUP_SIDE, 1);
+	glMemoryBarrier(GL_ALL_BARRIER_BITS);
+}
+
+static void run_fragment(const struct pass *pass, const struct pass_run *run, int width, int height)
+{
+	static const GLenum buffers[PASS_OUTPUTS_MAX] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
+							 GL_COLOR_ATTACHMENT3, GL_COLOR_ATTACHMENT4, GL_COLOR_ATTACHMENT5,
+							 GL_COLOR_ATTACHMENT6, GL_COLOR_ATTACHMENT7};
+	for (int i = 0; i < pass->outputs; i++)
+		glNamedFramebufferTexture(pass->framebuffer, buffers[i], run->targets[i]->id, run->level);
+	glNamedFramebufferDrawBuffers(pass->framebuffer, pass->outputs, buffers);
+	glBindFramebuffer(GL_DRAW_FRAMEBUFFER, pass->framebuffer);
+	glViewport(0, 0, width, height);
+	glBindVertexArray(pass->vertex_array);
+	glDrawArrays(GL_TRIANGLES, 0, 3);
+	/* Detached again, so that a texture deleted later is really freed, and none stays attached while it is sampled. */
+	for (int i = 0; i < pass->outputs; i++)
+		glNamedFramebufferTexture(pass->framebuffer, buffers[i], 0, 0);
+}
+
+static int level_size(int size, int level)
+{
+	return size >> level > 0 ? size >> level : 1;
+}
+
+void pass_run(const struct pass *pass, const struct pass_run *run)
+{
+	const int width = run->width ? run->width : level_size(run->targets[0]->width, run->level);
+	const int height = run->height ? run->height : level_size(run->targets[0]->height, run->level);
+
+	glPushDebugGroup(GL_DEBUG_SOURCE_APPLICATION, 0, -1, pass->name);
+	glUseProgram(pass->program);
+	if (pass->arguments >= 0)
+		glProgramUniform4fv(pass->program, pass->arguments, PASS_ARGUMENTS, &run->arguments[0][0]);
+	for (GLuint i = 0; i < PASS_SAMPLERS_MAX; i++)
+		if (run->samplers[i])
+			glBindTextureUnit(i, run->samplers[i]->id);
+	if (pass->compute)
+		run_compute(pass, run, width, height);
+	else
+		run_fragment(pass, run, width, height);
+	glPopDebugGroup();
+}

@@ -1,0 +1,74 @@
+#include "renderer/gl/texture.h"
+
+#include "renderer/gl/context.h"
+
+#include <epoxy/gl.h>
+
+static const struct {
+	GLenum internal, external;
+	size_t texel_bytes;
+} formats[] = {
+	[TEXTURE_R32F] = {GL_R32F, GL_RED, 4},         [TEXTURE_RG32F] = {GL_RG32F, GL_RG, 8},
+	[TEXTURE_RGBA32F] = {GL_RGBA32F, GL_RGBA, 16}, [TEXTURE_RGBA16F] = {GL_RGBA16F, GL_RGBA, 8},
+	[TEXTURE_RGBA8] = {GL_RGBA8, GL_RGBA, 4},      [TEXTURE_RGBA16] = {GL_RGBA16, GL_RGBA, 8},
+};
+
+static int level_count(int width, int height)
+{
+	int levels = 1;
+	for (int size = width > height ? width : height; size > 1; size /= 2)
+		levels++;
+	return levels;
+}
+
+bool texture_init(struct texture *texture, int width, int height, enum texture_format format, int flags)
+{
+	const bool mipmaps = flags & TEXTURE_MIPMAPS;
+	*texture = (struct texture){.width = width, .height = height, .levels = mipmaps ? level_count(width, height) : 1, .format = format};
+	glCreateTextures(GL_TEXTURE_2D, 1, &texture->id);
+	glTextureStorage2D(texture->id, texture->levels, formats[format].internal, width, height);
+
+	const GLint filter = flags & TEXTURE_NEAREST ? GL_NEAREST : GL_LINEAR;
+	const GLint mip_filter = flags & TEXTURE_NEAREST ? GL_NEAREST_MIPMAP_NEAREST : GL_LINEAR_MIPMAP_LINEAR;
+	glTextureParameteri(texture->id, GL_TEXTURE_MAG_FILTER, filter);
+	glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER, mipmaps ? mip_filter : filter);
+	glTextureParameteri(texture->id, GL_TEXTURE_WRAP_S, flags & (TEXTURE_REPEAT | TEXTURE_REPEAT_X) ? GL_REPEAT : GL_CLAMP_TO_EDGE);
+	glTextureParameteri(texture->id, GL_TEXTURE_WRAP_T, flags & TEXTURE_REPEAT ? GL_REPEAT : GL_CLAMP_TO_EDGE);
+	if (gl_failed("texture storage")) {
+		texture_finish(texture);
+		return false;
+	}
+	return true;
+}
+
+void texture_upload(const struct texture *texture, const float *values)
+{
+	glTextureSubImage2D(texture->id, 0, 0, 0, texture->width, texture->height, formats[texture->format].external, GL_FLOAT, values);
+}
+
+void texture_build_mipmaps(const struct texture *texture)
+{
+	glGenerateTextureMipmap(texture->id);
+}
+
+size_t texture_bytes(const struct texture *texture)
+{
+	size_t bytes = 0;
+	for (int level = 0; level < texture->levels; level++) {
+		const int width = texture->width >> level, height = texture->height >> level;
+		bytes += formats[texture->format].texel_bytes * (size_t)(width ? width : 1) * (size_t)(height ? height : 1);
+	}
+	return texture->id ? bytes : 0;
+}
+
+void texture_finish(struct texture *texture)
+{
+	if (texture->id)
+		glDeleteTextures(1, &texture->id);
+	*texture = (struct texture){0};
+}
+
+unsigned texture_internal_format(enum texture_format format)
+{
+	return formats[format].internal;
+}

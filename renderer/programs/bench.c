@@ -1,0 +1,202 @@
+/* render-bench: renders scenes without HTTP, JSON or OpenImageIO and prints what each stage costs; writes what it rendered as a PPM or PFM.
+ *
+ * Every number of a scene that matters for looks can be set as NAME=VALUE, which makes it a tool for working on shaders too. */
+#include "renderer/gl/timer.h"
+#include "renderer/optics/kernel.h"
+#include "renderer/renderer.h"
+
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct setting {
+	const char *name;
+	size_t offset;
+	const char *const *words; /* enumerations are stored as int; NULL for a double */
+};
+
+#define NUMBER(name, member)                                                                                                               \
+	{                                                                                                                                  \
+		name, offsetof(struct scene, member), NULL                                                                                 \
+	}
+#define WORD(name, member, words)                                                                                                          \
+	{                                                                                                                                  \
+		name, offsetof(struct scene, member), words                                                                                \
+	}
+
+static const struct setting settings[] = {
+	NUMBER("sun.elevation_deg", sun.elevation_deg),
+	NUMBER("sun.azimuth_deg", sun.azimuth_deg),
+	NUMBER("dsd.n0_per_cm3", dsd.n0_per_cm3),
+	NUMBER("dsd.gamma", dsd.gamma),
+	NUMBER("dsd.effective_radius_um", dsd.effective_radius_um),
+	WORD("clouds.type", clouds.type, scene_cloud_type_names),
+	NUMBER("clouds.time_s", clouds.time_s),
+	NUMBER("clouds.coverage", clouds.coverage),
+	NUMBER("clouds.base_m", clouds.base_m),
+	NUMBER("clouds.thickness_m", clouds.thickness_m),
+	NUMBER("clouds.tile_m", clouds.tile_m),
+	WORD("ground.type", ground.type, scene_ground_type_names),
+	NUMBER("ground.albedo.0", ground.albedo[0]),
+	NUMBER("ground.albedo.1", ground.albedo[1]),
+	NUMBER("ground.albedo.2", ground.albedo[2]),
+	NUMBER("atmosphere.aerosol_optical_depth", atmosphere.aerosol_optical_depth),
+	NUMBER("atmosphere.ozone_du", atmosphere.ozone_du),
+	NUMBER("camera.x_m", camera.position_m[0]),
+	NUMBER("camera.y_m", camera.position_m[1]),
+	NUMBER("camera.z_m", camera.position_m[2]),
+	NUMBER("camera.azimuth_deg", camera.azimuth_deg),
+	NUMBER("camera.elevation_deg", camera.elevation_deg),
+	NUMBER("camera.roll_deg", camera.roll_deg),
+	NUMBER("camera.vertical_fov_deg", camera.vertical_fov_deg),
+	NUMBER("radiosity.tolerance", radiosity.tolerance),
+};
+
+static void usage(FILE *to)
+{
+	fprintf(to, "usage: render-bench [-k KERNEL] [-s SHADER_DIR] [-p auto|fragment|compute] [-d DEVICE] [-n FRAMES] [-w WIDTH] [-h "
+		    "HEIGHT]\n"
+		    "                    [-S SEED] [-R] [-o FILE.ppm|FILE.pfm] [NAME=VALUE ...]\n"
+		    "Renders the default scene with these changes and prints milliseconds per stage of the first frame, of a repeated one "
+		    "with the\n"
+		    "camera turned, and of one with another time. -R switches the radiosity off. NAME is a member as in JSON (camera.z_m "
+		    "for heights).\n");
+}
+
+static bool apply(struct scene *scene, const char *text)
+{
+	const char *equals = strchr(text, '=');
+	for (size_t i = 0; equals && i < sizeof settings / sizeof *settings; i++) {
+		const struct setting *s = &settings[i];
+		if (strlen(s->name) != (size_t)(equals - text) || strncmp(s->name, text, (size_t)(equals - text)) != 0)
+			continue;
+		char *at = (char *)scene + s->offset;
+		if (!s->words) {
+			char *end;
+			const double number = strtod(equals + 1, &end);
+			memcpy(at, &number, sizeof number);
+			return *end == 0 && end != equals + 1;
+		}
+		for (int k = 0; s->words[k]; k++)
+			if (strcmp(s->words[k], equals + 1) == 0) {
+				memcpy(at, &k, sizeof k);
+				return true;
+			}
+	}
+	return false;
+}
+
+static bool write_picture(const struct frame *frame, const char *path)
+{
+	FILE *file = fopen(path, "wb");
+	if (!file)
+		return false;
+	const size_t row = (size_t)frame->width * 3 * (frame->type == PIXEL_F32 ? 4 : 1);
+	if (frame->type == PIXEL_F32) {
+		fprintf(file, "PF\n%d %d\n-1\n", frame->width, frame->height);
+		for (int y = frame->height - 1; y >= 0; y--)
+			fwrite((char *)frame->pixels + (size_t)y * row, 1, row, file);
+	} else {
+		fprintf(file, "P6\n%d %d\n255\n", frame->width, frame->height);
+		fwrite(frame->pixels, 1, row * (size_t)frame->height, file);
+	}
+	return fclose(file) == 0;
+}
+
+static void print_timing(const char *name, const struct frame *frame, double wall)
+{
+	printf("%-16s", name);
+	for (int i = 0; i < STAGE_COUNT; i++)
+		printf(" %s %.2f%s", stage_names[i], frame->timing[i].milliseconds, frame->timing[i].reused ? "*" : "");
+	printf(" wall %.2f ms (passes %d, residual %.1e, %.0f lux, EV %.2f)\n", wall, frame->radiosity_passes, frame->radiosity_residual,
+	       frame->global_illuminance_lux, frame->exposure_ev);
+}
+
+static bool render(struct renderer *renderer, const struct scene *scene, const char *name, const char *path)
+{
+	struct frame frame;
+	const double begin = clock_milliseconds();
+	if (renderer_render(renderer, scene, NULL, NULL, &frame) != RENDER_OK)
+		return false;
+	print_timing(name, &frame, clock_milliseconds() - begin);
+	const bool ok = !path || write_picture(&frame, path);
+	frame_finish(&frame);
+	return ok;
+}
+
+int main(int argc, char **argv)
+{
+	const char *kernel_path = "build/mie.kernel", *output = NULL;
+	struct renderer_params params = {.device_index = -1};
+	struct scene scene = scene_default();
+	int frames = 3, option, status = 1;
+	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:Ro:")) != -1) {
+		switch (option) {
+		case 'k':
+			kernel_path = optarg;
+			break;
+		case 's':
+			params.shader_dir = optarg;
+			break;
+		case 'p':
+			params.pass_kind = *optarg == 'f' ? PASS_FRAGMENT : *optarg == 'c' ? PASS_COMPUTE : PASS_AUTO;
+			break;
+		case 'd':
+			params.device_index = atoi(optarg);
+			break;
+		case 'n':
+			frames = atoi(optarg);
+			break;
+		case 'w':
+			scene.output.width = atoi(optarg);
+			break;
+		case 'h':
+			scene.output.height = atoi(optarg);
+			break;
+		case 'S':
+			scene.clouds.seed = (uint32_t)strtoul(optarg, NULL, 10);
+			break;
+		case 'R':
+			scene.radiosity.enabled = false;
+			break;
+		case 'o':
+			output = optarg;
+			break;
+		default:
+			usage(stderr);
+			return 2;
+		}
+	}
+	if (output && strstr(output, ".pfm"))
+		scene.output.format = IMAGE_EXR;
+	for (; optind < argc; optind++) {
+		if (!apply(&scene, argv[optind])) {
+			fprintf(stderr, "render-bench: cannot set %s\n", argv[optind]);
+			usage(stderr);
+			return 2;
+		}
+	}
+
+	const double begin = clock_milliseconds();
+	struct kernel *kernel = kernel_load(kernel_path);
+	params.kernel = kernel;
+	struct renderer *renderer = kernel ? renderer_create(&params) : NULL;
+	if (!renderer)
+		goto end;
+	printf("start %.0f ms on %s\n", clock_milliseconds() - begin, renderer_info(renderer)->renderer);
+	if (!render(renderer, &scene, "first", output))
+		goto end;
+	for (int i = 0; i < frames; i++) {
+		scene.camera.azimuth_deg += 5;
+		if (!render(renderer, &scene, "camera turned", NULL))
+			goto end;
+	}
+	scene.clouds.time_s += 1;
+	status = render(renderer, &scene, "one second on", NULL) ? 0 : 1;
+
+end:
+	renderer_destroy(renderer);
+	kernel_destroy(kernel);
+	return status;
+}

@@ -1,0 +1,378 @@
+#include "renderer/renderer.h"
+
+#include "renderer/gl/context.h"
+#include "renderer/gl/timer.h"
+#include "renderer/log.h"
+#include "renderer/stages/colour.h"
+#include "renderer/stages/ground.h"
+#include "renderer/stages/view.h"
+
+#include <epoxy/gl.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *const stage_names[STAGE_COUNT] = {"optics", "sky", "field", "radiosity", "view", "readback"};
+
+struct renderer {
+	struct gl_context *gl;
+	struct renderer_info info;
+	struct stage_context context;
+	struct sky_stage sky;
+	struct field_stage field;
+	struct radiosity_stage radiosity;
+	struct view_stage view;
+	struct gl_timer timers[STAGE_COUNT];
+};
+
+enum { DEFAULT_CACHE_BYTES = 256 << 20 };
+
+/* --- life ------------------------------------------------------------------------------------------------------------------------ */
+
+static bool compile_stages(struct renderer *renderer, const struct pass_compiler *compiler)
+{
+	return sky_stage_init(&renderer->sky, compiler) && field_stage_init(&renderer->field, compiler) &&
+	       radiosity_stage_init(&renderer->radiosity, compiler) && view_stage_init(&renderer->view, compiler);
+}
+
+static void finish_stages(struct renderer *renderer)
+{
+	view_stage_finish(&renderer->view);
+	radiosity_stage_finish(&renderer->radiosity);
+	field_stage_finish(&renderer->field);
+	sky_stage_finish(&renderer->sky);
+}
+
+/* Small scene that exercises every pass, for measuring and for having every shader built before the first request. */
+static bool warm_up(struct renderer *renderer, double *milliseconds)
+{
+	struct scene scene = scene_default();
+	struct frame frame;
+	scene.output.width = scene.output.height = 256;
+	double best = 1e9;
+	for (int i = 0; i < 3; i++) {
+		scene.camera.azimuth_deg = 10.0 * i; /* else the picture would be remembered */
+		const double begin = clock_milliseconds();
+		if (renderer_render(renderer, &scene, NULL, NULL, &frame) != RENDER_OK)
+			return false;
+		best = fmin(best, clock_milliseconds() - begin);
+		frame_finish(&frame);
+	}
+	*milliseconds = best;
+	return true;
+}
+
+/* Fragment or compute: software Mesa runs fragments faster, some data-centre parts compute; both ways of one text, so the faster is taken.
+ */
+static bool choose_pass_kind(struct renderer *renderer, const struct renderer_params *params)
+{
+	double fragment, compute;
+	struct pass_compiler compiler = {.kind = PASS_FRAGMENT, .shader_dir = params->shader_dir};
+	if (!compile_stages(renderer, &compiler) || !warm_up(renderer, &fragment))
+		return false;
+	renderer->info.pass_kind = PASS_FRAGMENT;
+	if (renderer->info.software)
+		return true; /* known, and measuring would double the time to start */
+	finish_stages(renderer);
+	compiler.kind = PASS_COMPUTE;
+	if (!compile_stages(renderer, &compiler) || !warm_up(renderer, &compute))
+		return false;
+	log_info("renderer: %.2f ms a picture in fragment, %.2f ms in compute programs", fragment, compute);
+	renderer->info.pass_kind = PASS_COMPUTE;
+	if (compute <= fragment)
+		return true;
+	finish_stages(renderer);
+	compiler.kind = renderer->info.pass_kind = PASS_FRAGMENT;
+	return compile_stages(renderer, &compiler);
+}
+
+static bool start_stages(struct renderer *renderer, const struct renderer_params *params)
+{
+	double milliseconds;
+	const struct pass_compiler compiler = {.kind = params->pass_kind, .shader_dir = params->shader_dir};
+	if (params->pass_kind == PASS_AUTO)
+		return choose_pass_kind(renderer, params);
+	renderer->info.pass_kind = params->pass_kind;
+	return compile_stages(renderer, &compiler) && warm_up(renderer, &milliseconds);
+}
+
+struct renderer *renderer_create(const struct renderer_params *params)
+{
+	struct renderer *renderer = calloc(1, sizeof *renderer);
+	if (!renderer)
+		return NULL;
+	renderer->gl = gl_context_create(params->device_index, params->require_gpu);
+	if (!renderer->gl)
+		goto fail;
+	const struct gl_context_info *gl = gl_context_info(renderer->gl);
+	renderer->info = (struct renderer_info){.vendor = gl->vendor,
+						.renderer = gl->renderer,
+						.version = gl->version,
+						.platform = gl->platform,
+						.software = gl->software,
+						.max_texture_size = gl->max_texture_size};
+	renderer->context.kernel = params->kernel;
+	renderer->context.cache = cache_create(params->cache_bytes ? params->cache_bytes : DEFAULT_CACHE_BYTES);
+	if (!renderer->context.cache)
+		goto fail;
+	glCreateBuffers(1, &renderer->context.block_buffer);
+	glNamedBufferStorage(renderer->context.block_buffer, sizeof renderer->context.block, NULL, GL_DYNAMIC_STORAGE_BIT);
+	if (!start_stages(renderer, params)) {
+		log_error("renderer: cannot start");
+		goto fail;
+	}
+	return renderer;
+
+fail:
+	renderer_destroy(renderer);
+	return NULL;
+}
+
+void renderer_destroy(struct renderer *renderer)
+{
+	if (!renderer)
+		return;
+	if (renderer->gl) {
+		for (int i = 0; i < STAGE_COUNT; i++)
+			gl_timer_finish(&renderer->timers[i]);
+		finish_stages(renderer);
+		cache_destroy(renderer->context.cache);
+		if (renderer->context.block_buffer)
+			glDeleteBuffers(1, &renderer->context.block_buffer);
+		gl_context_destroy(renderer->gl);
+	}
+	free(renderer);
+}
+
+const struct renderer_info *renderer_info(const struct renderer *renderer)
+{
+	return &renderer->info;
+}
+
+/* --- one frame -------------------------------------------------------------------------------------------------------------------- */
+
+/* Work of one call of renderer_render. */
+struct job {
+	struct renderer *renderer;
+	const struct scene *scene;
+	renderer_cancelled *cancelled;
+	void *cancel_context;
+	struct frame *frame;
+
+	double mean_albedo[3], max_albedo;
+	const struct droplets *droplets;
+	const struct slab_tables *slab;
+	struct sky_tables sky;
+	struct field_maps maps;
+	struct radiosity_light light;
+	bool clouds;
+	const struct texture *pictures[LAYER_COUNT];
+	struct texture developed;
+};
+
+static bool run_optics(struct job *job)
+{
+	struct stage_context *context = &job->renderer->context;
+	job->droplets = droplets_get(context, job->scene);
+	job->slab = job->droplets ? slab_tables_get(context, job->scene, job->droplets) : NULL;
+	return job->slab != NULL;
+}
+
+static bool run_sky(struct job *job)
+{
+	return sky_stage_run(&job->renderer->sky, &job->renderer->context, job->scene, job->mean_albedo, &job->sky);
+}
+
+static bool run_field(struct job *job)
+{
+	const bool above = job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
+	return field_stage_run(&job->renderer->field, &job->renderer->context, job->scene, above, &job->maps);
+}
+
+static bool run_radiosity(struct job *job)
+{
+	struct scene_block *block = &job->renderer->context.block;
+	for (int band = 0; band < 3; band++)
+		block->air_below[band] = 1;
+	job->clouds = job->maps.coarse != NULL;
+	return !job->clouds || radiosity_stage_run(&job->renderer->radiosity, &job->renderer->context, job->scene, job->max_albedo,
+						   &job->sky, &job->maps, job->slab, &job->light);
+}
+
+/* Horizontal illuminance at the camera: above the clouds by the clear sky, below them means over the tile. */
+static void fill_illuminance(struct job *job)
+{
+	const double mu = fmax(0, sin(job->scene->sun.elevation_deg * M_PI / 180));
+	const bool below = job->clouds && job->scene->camera.position_m[2] < job->scene->clouds.base_m;
+	const bool high = job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
+	double direct[3], diffuse[3];
+	for (int band = 0; band < 3; band++) {
+		direct[band] = below ? job->light.ground_direct[band] : mu * (high ? job->sky.sun_cloud : job->sky.sun_ground)[band];
+		diffuse[band] = below ? job->light.ground_diffuse[band] : (high ? job->sky.diffuse_cloud : job->sky.diffuse_ground)[band];
+	}
+	job->frame->direct_illuminance_lux = colour_luminance(direct);
+	job->frame->diffuse_illuminance_lux = colour_luminance(diffuse);
+	job->frame->global_illuminance_lux = job->frame->direct_illuminance_lux + job->frame->diffuse_illuminance_lux;
+}
+
+/* Automatic exposure: a white sheet under the scene's illuminance comes out a little below white; most of a change of light is followed, as
+ * an eye does, but not all, so that dusk stays darker than noon. */
+static double exposure_of(const struct scene *scene, double illuminance_lux)
+{
+	if (!scene->output.exposure_auto)
+		return scene->output.exposure_ev;
+	const double lux = fmax(illuminance_lux, 1e-2);
+	return log2(M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.14 * log2(lux / 50000);
+}
+
+static int list_layers(const struct scene *scene, enum layer *layers)
+{
+	int count = 0;
+	if (scene->output.format == IMAGE_PNG) {
+		layers[count++] = LAYER_COLOR;
+		return count;
+	}
+	for (int i = 0; i < LAYER_COUNT; i++)
+		if (scene->output.layers & 1u << i)
+			layers[count++] = (enum layer)i;
+	return count;
+}
+
+static bool run_view(struct job *job)
+{
+	struct renderer *renderer = job->renderer;
+	struct stage_context *context = &renderer->context;
+	const struct scene_output *output = &job->scene->output;
+	struct frame *frame = job->frame;
+	const struct view_inputs inputs = {.droplets = job->droplets,
+					   .slab = job->slab,
+					   .sky = &job->sky,
+					   .field = &job->maps,
+					   .light = job->clouds ? &job->light : NULL};
+	fill_illuminance(job);
+	frame->exposure_ev = exposure_of(job->scene, frame->global_illuminance_lux);
+	context->block.develop[0] = output->exposure_auto;
+	context->block.develop[1] = (float)frame->exposure_ev;
+	context->block.develop[2] = output->tone;
+	context->block.develop[3] = output->bits == 16 ? 65535 : 255;
+	stage_upload_block(context);
+	frame->layer_count = list_layers(job->scene, frame->layer);
+	if (!view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
+			    job->cancel_context, job->pictures))
+		return false;
+	if (output->format != IMAGE_PNG)
+		return true;
+	if (!texture_init(&job->developed, output->width, output->height, output->bits == 16 ? TEXTURE_RGBA16 : TEXTURE_RGBA8,
+			  TEXTURE_NEAREST))
+		return false;
+	view_develop(&renderer->view, job->pictures[0], &job->developed);
+	return true;
+}
+
+/* Drops every fourth component. */
+static void pack_rgb(void *pixels, size_t count, size_t component_bytes)
+{
+	unsigned char *to = pixels;
+	const unsigned char *from = pixels;
+	for (size_t i = 0; i < count; i++, to += 3 * component_bytes, from += 4 * component_bytes)
+		memmove(to, from, 3 * component_bytes);
+}
+
+static bool run_readback(struct job *job)
+{
+	struct frame *frame = job->frame;
+	const struct scene_output *output = &job->scene->output;
+	const bool png = output->format == IMAGE_PNG;
+	frame->width = output->width;
+	frame->height = output->height;
+	frame->channels = 3;
+	frame->type = !png ? PIXEL_F32 : output->bits == 16 ? PIXEL_U16 : PIXEL_U8;
+	const size_t component = frame->type == PIXEL_F32 ? 4 : frame->type == PIXEL_U16 ? 2 : 1;
+	const GLenum type = frame->type == PIXEL_F32 ? GL_FLOAT : frame->type == PIXEL_U16 ? GL_UNSIGNED_SHORT : GL_UNSIGNED_BYTE;
+	const size_t texels = (size_t)frame->width * (size_t)frame->height, plane = texels * 3 * component;
+	frame->bytes = plane * (size_t)frame->layer_count;
+	/* Room for the fourth component of the last layer while it is packed. */
+	unsigned char *pixels = frame->pixels = malloc(frame->bytes + texels * component);
+	if (!pixels)
+		return false;
+	for (int i = 0; i < frame->layer_count; i++) {
+		const struct texture *picture = png ? &job->developed : job->pictures[i];
+		glGetTextureImage(picture->id, 0, GL_RGBA, type, (GLsizei)(texels * 4 * component), pixels + (size_t)i * plane);
+		pack_rgb(pixels + (size_t)i * plane, texels, component);
+	}
+	return true;
+}
+
+static bool (*const stage_functions[STAGE_COUNT])(struct job *job) = {
+	[STAGE_OPTICS] = run_optics,       [STAGE_SKY] = run_sky,   [STAGE_FIELD] = run_field,
+	[STAGE_RADIOSITY] = run_radiosity, [STAGE_VIEW] = run_view, [STAGE_READBACK] = run_readback,
+};
+
+static bool on_processor(enum stage stage)
+{
+	return stage == STAGE_OPTICS || stage == STAGE_READBACK;
+}
+
+static enum render_result run_stages(struct job *job)
+{
+	struct renderer *renderer = job->renderer;
+	for (int i = 0; i < STAGE_COUNT; i++) {
+		struct stage_timing *timing = &job->frame->timing[i];
+		if (job->cancelled && job->cancelled(job->cancel_context))
+			return RENDER_CANCELLED;
+		if (i == STAGE_READBACK)
+			glFinish();
+		const double begin = clock_milliseconds();
+		renderer->context.reused = i != STAGE_READBACK;
+		gl_timer_begin(&renderer->timers[i]);
+		const bool ok = stage_functions[i](job);
+		gl_timer_end(&renderer->timers[i]);
+		timing->milliseconds = clock_milliseconds() - begin;
+		timing->reused = renderer->context.reused;
+		if (!ok)
+			return job->cancelled && job->cancelled(job->cancel_context) ? RENDER_CANCELLED : RENDER_OUT_OF_MEMORY;
+		if (gl_failed(stage_names[i]))
+			return gl_failed_for_memory() ? RENDER_OUT_OF_MEMORY : RENDER_FAILED;
+	}
+	for (int i = 0; i < STAGE_COUNT; i++)
+		if (!on_processor((enum stage)i))
+			job->frame->timing[i].milliseconds = gl_timer_milliseconds(&renderer->timers[i]);
+	return RENDER_OK;
+}
+
+enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
+				   struct frame *frame)
+{
+	*frame = (struct frame){0};
+	struct job job = {.renderer = renderer, .scene = scene, .cancelled = cancelled, .cancel_context = context, .frame = frame};
+	if (scene->output.width > renderer->info.max_texture_size || scene->output.height > renderer->info.max_texture_size) {
+		log_error("renderer: %d x %d is more than this device's %d", scene->output.width, scene->output.height,
+			  renderer->info.max_texture_size);
+		return RENDER_OUT_OF_MEMORY;
+	}
+	cache_begin_frame(renderer->context.cache);
+	memset(&renderer->context.block, 0, sizeof renderer->context.block);
+	job.max_albedo = ground_mean_reflectance(&scene->ground, job.mean_albedo);
+	view_fill_block(&renderer->context.block, scene);
+	/* The sky is tabulated up to the layer, so its heights are known before the field is. */
+	renderer->context.block.cloud_layer[0] = (float)scene->clouds.base_m;
+	renderer->context.block.cloud_layer[1] = (float)scene->clouds.thickness_m;
+	renderer->context.block.cloud_layer[3] = scene->clouds.type != CLOUD_NONE && scene->clouds.thickness_m > 0;
+
+	const enum render_result result = run_stages(&job);
+	frame->radiosity_passes = job.light.passes;
+	frame->radiosity_residual = job.light.residual;
+	texture_finish(&job.developed);
+	if (result != RENDER_OK) {
+		if (result == RENDER_OUT_OF_MEMORY)
+			log_error("renderer: out of memory");
+		frame_finish(frame);
+	}
+	return result;
+}
+
+void frame_finish(struct frame *frame)
+{
+	free(frame->pixels);
+	*frame = (struct frame){0};
+}

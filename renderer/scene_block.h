@@ -1,0 +1,39 @@
+/* The uniform block that every pass sees, as laid out by std140: four floats a member, nothing else. The GLSL side is
+ * shaders/lib/scene_block.glsl, with the same names in the same order. Colours are per band: 650, 550, 450 nm.
+ */
+#ifndef STRATUS_RENDERER_SCENE_BLOCK_H
+#define STRATUS_RENDERER_SCENE_BLOCK_H
+
+enum { SCENE_BLOCK_BINDING = 0 };
+
+struct scene_block {
+	float sun_direction[4];         /* unit vector to the sun; angular radius in radians */
+	float solar_irradiance[4];      /* outside the atmosphere on a plane normal to the beam, W/m2/nm; - */
+	float rayleigh[4];              /* scattering coefficient at the ground, 1/m; scale height, m */
+	float aerosol[4];               /* extinction coefficient at the ground, 1/m; scale height, m */
+	float aerosol_shape[4];         /* single scattering albedo; asymmetry; -; - */
+	float ozone[4];                 /* absorption coefficient at its peak, 1/m; height of the peak, m */
+	float ground_albedo[4];         /* of lambert ground, else the scale alone; type of ground (enum ground_type) */
+	float ground_mean_albedo[4];    /* over the tile; tile of ground and cloud, m */
+	float camera_position[4];       /* x, y modulo the tile, z: metres above ground; distance between pixel centres, rad */
+	float camera_right[4];          /* unit; tangent of half the horizontal field of view */
+	float camera_up[4];             /* unit; tangent of half the vertical field of view */
+	float camera_forward[4];        /* unit; projection (enum projection) */
+	float image_size[4];            /* width, height, 1/width, 1/height */
+	float cloud_layer[4];           /* base, m; thickness (maximum of H), m; tile, m; 1 when there are clouds */
+	float cloud_field[4];           /* seed (exact integer below 2^24 of a hash); coverage; time, s; type (enum cloud_type) */
+	float cloud_drift[4];           /* drift of the cells so far, m, modulo the tile: east, north; extra drift of the turbulence */
+	float cloud_detail[4];          /* tile of the detail, m; its drift, m: east, north; weight */
+	float cloud_threshold[4];       /* field value where H begins; 1/(range above it); exponent of H; resolution of the field */
+	float extinction[4];            /* kappa, 1/m; the same over the extinction of appendix B (thickness by similarity), 550 nm */
+	float extinction_modified[4];   /* kappa_S, 1/m; P_f at 550 nm */
+	float sky_irradiance_cloud[4];  /* clear sky on a horizontal plane at the top of the layer, W/m2/nm */
+	float sky_irradiance_ground[4]; /* the same at the ground, without clouds */
+	float air_below[4];             /* how much darker the clouds make the light of the air beneath them, 0..1 */
+	float band_red[4];              /* linear Rec.709 of unit radiance at 650 nm, 1 = 1000 cd/m2 (stages/colour.h) */
+	float band_green[4];            /* 550 nm */
+	float band_blue[4];             /* 450 nm */
+	float develop[4]; /* exposure: automatic (1) or fixed (0); its value, EV; tone (enum tone); largest code of the output */
+};
+
+#endif

@@ -1,0 +1,98 @@
+#include "renderer/stages/exchange_weights.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Modified Bessel function K_1 for x > 0: Abramowitz and Stegun 9.8.7 and 9.8.8, absolute error of x K_1 below 1e-7. */
+static double bessel_k1(double x)
+{
+	if (x <= 2) {
+		const double y = x * x / 4, t = x / 3.75, u = t * t;
+		const double i1 =
+			x * (0.5 +
+			     u * (0.87890594 + u * (0.51498869 + u * (0.15084934 + u * (0.02658733 + u * (0.00301532 + u * 0.00032411))))));
+		return log(x / 2) * i1 +
+		       (1 +
+			y * (0.15443144 + y * (-0.67278579 + y * (-0.18156897 + y * (-0.01919402 + y * (-0.00110404 - y * 0.00004686)))))) /
+			       x;
+	}
+	const double y = 2 / x;
+	return exp(-x) / sqrt(x) *
+	       (1.25331414 +
+		y * (0.23498619 + y * (-0.03655620 + y * (0.01504268 + y * (-0.00780353 + y * (0.00325614 - y * 0.00068245))))));
+}
+
+double exchange_kernel_transform(double wave_number_per_m, double distance_m)
+{
+	const double x = wave_number_per_m * distance_m;
+	return x < 1e-6 ? 1 : x > 80 ? 0 : x * bessel_k1(x);
+}
+
+static double sinc(double x)
+{
+	return fabs(x) < 1e-6 ? 1 : sin(x) / x;
+}
+
+double exchange_level_transform(double wave_number_per_m, double texel_m, int level)
+{
+	enum { DIRECTIONS = 8 };
+	if (level == EXCHANGE_LEVELS - 1) /* the mean over the tile */
+		return wave_number_per_m == 0;
+	const double half = 0.5 * wave_number_per_m * texel_m * (1 << level);
+	double sum = 0;
+	for (int i = 0; i < DIRECTIONS; i++) {
+		const double azimuth = (i + 0.5) * M_PI / 2 / DIRECTIONS;
+		const double s = sinc(half * cos(azimuth)) * sinc(half * sin(azimuth));
+		sum += s * s * s * s * s;
+	}
+	return sum / DIRECTIONS;
+}
+
+enum { WAVES = 96 };
+
+/* Non-negative least squares by coordinate descent on the normal equations, which are small and well scaled. */
+static void solve_nonnegative(const double matrix[EXCHANGE_LEVELS][EXCHANGE_LEVELS], const double right[EXCHANGE_LEVELS],
+			      double solution[EXCHANGE_LEVELS])
+{
+	memset(solution, 0, EXCHANGE_LEVELS * sizeof *solution);
+	for (int sweep = 0; sweep < 20000; sweep++) {
+		double change = 0;
+		for (int i = 0; i < EXCHANGE_LEVELS; i++) {
+			double rest = right[i];
+			for (int j = 0; j < EXCHANGE_LEVELS; j++)
+				rest -= j == i ? 0 : matrix[i][j] * solution[j];
+			const double next = fmax(0, rest / matrix[i][i]);
+			change = fmax(change, fabs(next - solution[i]));
+			solution[i] = next;
+		}
+		if (change < 1e-10)
+			break;
+	}
+}
+
+void exchange_weights(double tile_m, double distance_m, double weights[EXCHANGE_LEVELS])
+{
+	const double texel_m = tile_m / EXCHANGE_SIDE;
+	double matrix[EXCHANGE_LEVELS][EXCHANGE_LEVELS] = {{0}}, right[EXCHANGE_LEVELS] = {0};
+	for (int w = 0; w <= WAVES; w++) {
+		/* From the tile's own wave number to that of two texels, evenly in its logarithm, and k = 0 (the sum of the weights) above
+		 * all. */
+		const double k = w == WAVES ? 0 : 2 * M_PI / tile_m * pow(EXCHANGE_SIDE / 2.0, (double)w / (WAVES - 1));
+		const double importance = w == WAVES ? 1e4 : 1;
+		const double wanted = exchange_kernel_transform(k, distance_m);
+		double basis[EXCHANGE_LEVELS];
+		for (int i = 0; i < EXCHANGE_LEVELS; i++)
+			basis[i] = exchange_level_transform(k, texel_m, i);
+		for (int i = 0; i < EXCHANGE_LEVELS; i++) {
+			right[i] += importance * basis[i] * wanted;
+			for (int j = 0; j < EXCHANGE_LEVELS; j++)
+				matrix[i][j] += importance * basis[i] * basis[j];
+		}
+	}
+	solve_nonnegative(matrix, right, weights);
+	double sum = 0;
+	for (int i = 0; i < EXCHANGE_LEVELS; i++)
+		sum += weights[i];
+	for (int i = 0; i < EXCHANGE_LEVELS; i++)
+		weights[i] /= sum;
+}

@@ -1,0 +1,32 @@
+/* The field stage: thickness of the cloud layer over one periodic tile.
+ *
+ * Depends on the cloud's type, seed, time, coverage, tile, resolution and wind. The field is kept before its threshold
+ * (shaders/lib/field.glsl); coverage becomes the quantile of it where cloud begins. Views from above add the height of the top and its
+ * pyramid of maxima.
+ */
+#ifndef STRATUS_RENDERER_STAGES_FIELD_H
+#define STRATUS_RENDERER_STAGES_FIELD_H
+
+#include "renderer/stages/stage.h"
+
+enum { FIELD_PASS_COUNT = 5 };
+
+struct field_stage {
+	struct pass *passes[FIELD_PASS_COUNT];
+	unsigned histogram; /* OpenGL buffer */
+};
+
+struct field_maps {
+	const struct texture *coarse, *detail;  /* density before the threshold, and its detail */
+	const struct texture *height, *maximum; /* NULL unless asked for */
+};
+
+bool field_stage_init(struct field_stage *stage, const struct pass_compiler *compiler);
+void field_stage_finish(struct field_stage *stage);
+
+/* Fills in the block's cloud members. from_above: height and maximum are wanted too. Maps stay valid for this frame; without clouds they
+ * are all NULL. false (and a log line) when out of memory. */
+bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, bool from_above,
+		     struct field_maps *maps);
+
+#endif

@@ -1,0 +1,279 @@
+#include "renderer/stages/radiosity.h"
+
+#include "renderer/log.h"
+#include "renderer/optics/paper_slab.h"
+#include "renderer/stages/exchange_weights.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { PASS_SOURCES, PASS_START, PASS_EXCHANGE, PASS_CLOSE };
+
+static const struct pass_desc pass_descs[RADIOSITY_PASS_COUNT] = {
+	[PASS_SOURCES] = {.file = "shaders/passes/radiosity_sources.glsl",
+			  .outputs = 4,
+			  .samplers = {"transmittance_table", "field_coarse", "field_detail", "slab_sun_table"}},
+	[PASS_START] = {.file = "shaders/passes/radiosity_start.glsl",
+			.outputs = 4,
+			.samplers = {"cloud_source", "ground_albedo_plane", "ground_direct"}},
+	[PASS_EXCHANGE] = {.file = "shaders/passes/radiosity_exchange.glsl",
+			   .outputs = 4,
+			   .samplers = {"ground_received", "cloud_received", "ground_sends", "cloud_sends", "ground_albedo_plane",
+					"cloud_albedo_plane"}},
+	[PASS_CLOSE] = {.file = "shaders/passes/radiosity_close.glsl",
+			.outputs = 2,
+			.samplers = {"ground_received", "cloud_received", "ground_sends", "cloud_sends", "ground_albedo_plane",
+				     "cloud_albedo_plane"}},
+};
+
+/* The four moving planes exist twice, read from one set and written to the other. */
+enum { GROUND_RECEIVED, CLOUD_RECEIVED, GROUND_SENDS, CLOUD_SENDS, PLANE_COUNT };
+
+struct planes {
+	struct texture source, cloud_albedo, ground_albedo, ground_direct;
+	struct texture set[2][PLANE_COUNT];
+};
+
+struct result {
+	struct texture ground_received, cloud_received;
+	double ground_diffuse[3], ground_direct[3], residual;
+	int passes;
+};
+
+bool radiosity_stage_init(struct radiosity_stage *stage, const struct pass_compiler *compiler)
+{
+	return stage_create_passes(compiler, pass_descs, stage->passes, RADIOSITY_PASS_COUNT);
+}
+
+void radiosity_stage_finish(struct radiosity_stage *stage)
+{
+	stage_destroy_passes(stage->passes, RADIOSITY_PASS_COUNT);
+}
+
+static void planes_finish(struct planes *planes)
+{
+	struct texture *all[] = {&planes->source, &planes->cloud_albedo, &planes->ground_albedo, &planes->ground_direct};
+	for (int i = 0; i < 4; i++)
+		texture_finish(all[i]);
+	for (int i = 0; i < 2 * PLANE_COUNT; i++)
+		texture_finish(&planes->set[i / PLANE_COUNT][i % PLANE_COUNT]);
+}
+
+static bool plane_init(struct texture *texture)
+{
+	return texture_init(texture, EXCHANGE_SIDE, EXCHANGE_SIDE, TEXTURE_RGBA32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS);
+}
+
+static bool planes_init(struct planes *planes)
+{
+	*planes = (struct planes){0};
+	struct texture *all[] = {&planes->source, &planes->cloud_albedo, &planes->ground_albedo, &planes->ground_direct};
+	bool ok = true;
+	for (int i = 0; ok && i < 4; i++)
+		ok = plane_init(all[i]);
+	for (int i = 0; ok && i < 2 * PLANE_COUNT; i++)
+		ok = plane_init(&planes->set[i / PLANE_COUNT][i % PLANE_COUNT]);
+	if (!ok)
+		planes_finish(planes);
+	return ok;
+}
+
+/* Exchanges until what a round trip leaves falls below the tolerance: both planes' largest albedos bound it. */
+static int count_passes(const struct scene *scene, double max_albedo, double cloud_albedo)
+{
+	if (!scene->radiosity.enabled)
+		return 0;
+	const double round_trip = max_albedo * cloud_albedo;
+	const double wanted = round_trip < 1e-9 ? 1 : 2 * log(scene->radiosity.tolerance) / log(fmin(round_trip, 0.99));
+	return (int)fmin(scene->radiosity.max_passes, ceil(fmax(wanted, 1)));
+}
+
+static void fill_weights(float arguments[PASS_ARGUMENTS][4], const struct scene_clouds *clouds)
+{
+	double weights[EXCHANGE_LEVELS];
+	exchange_weights(clouds->tile_m, clouds->base_m, weights);
+	for (int i = 0; i < EXCHANGE_LEVELS; i++)
+		arguments[i / 4][i % 4] = (float)weights[i];
+}
+
+static void run_sources(const struct radiosity_stage *stage, struct planes *planes, const struct sky_tables *sky,
+			const struct field_maps *field, const struct slab_tables *slab)
+{
+	struct texture *targets[] = {&planes->source, &planes->cloud_albedo, &planes->ground_albedo, &planes->ground_direct};
+	pass_run(stage->passes[PASS_SOURCES],
+		 &(struct pass_run){.targets = targets, .samplers = {sky->transmittance, field->coarse, field->detail, &slab->sun}});
+	for (int i = 0; i < 4; i++)
+		texture_build_mipmaps(targets[i]);
+}
+
+static void run_exchange(const struct radiosity_stage *stage, struct planes *planes, int kind, int from, const struct pass_run *weights)
+{
+	const struct texture *set = planes->set[from];
+	struct texture *targets[PLANE_COUNT];
+	for (int i = 0; i < PLANE_COUNT; i++)
+		targets[i] = &planes->set[!from][i];
+	struct pass_run run = *weights;
+	run.targets = targets;
+	for (int i = 0; i < PLANE_COUNT; i++)
+		run.samplers[i] = &set[i];
+	run.samplers[PLANE_COUNT] = &planes->ground_albedo;
+	run.samplers[PLANE_COUNT + 1] = &planes->cloud_albedo;
+	pass_run(stage->passes[kind], &run);
+	for (int i = kind == PASS_CLOSE ? GROUND_RECEIVED : GROUND_SENDS; i < (kind == PASS_CLOSE ? GROUND_SENDS : PLANE_COUNT); i++)
+		texture_build_mipmaps(targets[i]);
+}
+
+static void mean_of(const struct texture *plane, double mean[3])
+{
+	float texel[4];
+	stage_read_texture(plane, EXCHANGE_LEVELS - 1, 4, texel);
+	for (int band = 0; band < 3; band++)
+		mean[band] = texel[band];
+}
+
+/* What is still on its way, relative to what the ground has: the largest band. */
+static double residual_of(const struct planes *planes, int set, const double received[3])
+{
+	double ground[3], cloud[3], largest = 0;
+	mean_of(&planes->set[set][GROUND_SENDS], ground);
+	mean_of(&planes->set[set][CLOUD_SENDS], cloud);
+	for (int band = 0; band < 3; band++)
+		largest = fmax(largest, (ground[band] + cloud[band]) / fmax(received[band], 1e-12));
+	return largest;
+}
+
+static void compute(const struct radiosity_stage *stage, struct planes *planes, const struct scene *scene, struct result *result)
+{
+	struct pass_run weights = {0};
+	fill_weights(weights.arguments, &scene->clouds);
+
+	struct pass_run start = weights;
+	struct texture *targets[PLANE_COUNT];
+	for (int i = 0; i < PLANE_COUNT; i++)
+		targets[i] = &planes->set[0][i];
+	start.targets = targets;
+	start.samplers[0] = &planes->source;
+	start.samplers[1] = &planes->ground_albedo;
+	start.samplers[2] = &planes->ground_direct;
+	pass_run(stage->passes[PASS_START], &start);
+	for (int i = 0; i < PLANE_COUNT; i++)
+		texture_build_mipmaps(targets[i]);
+
+	int at = 0;
+	for (int i = 0; i < result->passes; i++, at = !at)
+		run_exchange(stage, planes, PASS_EXCHANGE, at, &weights);
+	if (result->passes > 0) {
+		run_exchange(stage, planes, PASS_CLOSE, at, &weights);
+		mean_of(&planes->set[!at][GROUND_RECEIVED], result->ground_diffuse);
+		result->residual = residual_of(planes, at, result->ground_diffuse);
+		at = !at;
+	} else {
+		mean_of(&planes->set[at][GROUND_RECEIVED], result->ground_diffuse);
+	}
+	mean_of(&planes->ground_direct, result->ground_direct);
+
+	/* The two planes that the view needs move out of the set, whose rest is freed. */
+	result->ground_received = planes->set[at][GROUND_RECEIVED];
+	result->cloud_received = planes->set[at][CLOUD_RECEIVED];
+	planes->set[at][GROUND_RECEIVED] = planes->set[at][CLOUD_RECEIVED] = (struct texture){0};
+}
+
+static void result_destroy(void *value)
+{
+	struct result *result = value;
+	texture_finish(&result->cloud_received);
+	texture_finish(&result->ground_received);
+	free(result);
+}
+
+static struct cache_key make_key(const struct scene *scene)
+{
+	const struct scene_clouds *clouds = &scene->clouds;
+	const double inputs[] = {scene->sun.elevation_deg,
+				 scene->sun.azimuth_deg,
+				 scene->dsd.n0_per_cm3,
+				 scene->dsd.gamma,
+				 scene->dsd.effective_radius_um,
+				 clouds->type,
+				 clouds->seed,
+				 clouds->time_s,
+				 clouds->coverage,
+				 clouds->base_m,
+				 clouds->thickness_m,
+				 clouds->tile_m,
+				 clouds->resolution,
+				 clouds->wind_mps[0],
+				 clouds->wind_mps[1],
+				 scene->ground.type,
+				 scene->ground.albedo[0],
+				 scene->ground.albedo[1],
+				 scene->ground.albedo[2],
+				 scene->ground.albedo_scale,
+				 scene->atmosphere.aerosol_optical_depth,
+				 scene->atmosphere.ozone_du,
+				 scene->radiosity.enabled,
+				 scene->radiosity.tolerance,
+				 scene->radiosity.max_passes,
+				 scene->model.shading,
+				 scene->model.optics};
+	struct cache_key key = cache_key_make("radiosity");
+	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
+		cache_key_add(&key, inputs[i]);
+	return key;
+}
+
+static struct result *result_compute(const struct radiosity_stage *stage, const struct stage_context *context, const struct scene *scene,
+				     double max_albedo, const struct sky_tables *sky, const struct field_maps *field,
+				     const struct slab_tables *slab)
+{
+	struct planes planes;
+	struct result *result = calloc(1, sizeof *result);
+	if (!result || !planes_init(&planes)) {
+		free(result);
+		return NULL;
+	}
+	const double cloud_albedo = 1 - paper_spherical_transmittance(scene->clouds.thickness_m * context->block.extinction[3]);
+	result->passes = count_passes(scene, max_albedo, cloud_albedo);
+	run_sources(stage, &planes, sky, field, slab);
+	compute(stage, &planes, scene, result);
+	planes_finish(&planes);
+	return result;
+}
+
+/* Air under the clouds is lit by what comes through them: as much darker as the ground is. */
+static void fill_air_below(struct scene_block *block, const struct result *result, const struct sky_tables *sky)
+{
+	const double mu = fmax(0, block->sun_direction[2]);
+	for (int band = 0; band < 3; band++) {
+		const double clear = sky->sun_ground[band] * mu + sky->diffuse_ground[band];
+		const double clouded = result->ground_direct[band] + result->ground_diffuse[band];
+		block->air_below[band] = (float)(clear > 0 ? fmin(1.5, clouded / clear) : 1);
+	}
+}
+
+bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_context *context, const struct scene *scene, double max_albedo,
+			 const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab,
+			 struct radiosity_light *light)
+{
+	const struct cache_key key = make_key(scene);
+	struct result *result = cache_find(context->cache, &key);
+	if (!result) {
+		context->reused = false;
+		stage_upload_block(context);
+		result = result_compute(stage, context, scene, max_albedo, sky, field, slab);
+		if (!result || !cache_keep(context->cache, &key, result, 2 * texture_bytes(&result->ground_received), result_destroy)) {
+			log_error("radiosity: out of memory");
+			return false;
+		}
+	}
+	fill_air_below(&context->block, result, sky);
+	*light = (struct radiosity_light){.ground_received = &result->ground_received,
+					  .cloud_received = &result->cloud_received,
+					  .passes = result->passes,
+					  .residual = result->residual};
+	for (int band = 0; band < 3; band++) {
+		light->ground_diffuse[band] = result->ground_diffuse[band];
+		light->ground_direct[band] = result->ground_direct[band];
+	}
+	return true;
+}

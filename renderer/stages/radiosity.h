@@ -1,0 +1,37 @@
+/* The radiosity stage: light between the cloud base and the ground (paper, section 5).
+ *
+ * Both planes are periodic pictures of one tile, EXCHANGE_SIDE texels a side. Each exchange lets both send what they reflect; after the
+ * last one, the rest is closed analytically in the means.
+ */
+#ifndef STRATUS_RENDERER_STAGES_RADIOSITY_H
+#define STRATUS_RENDERER_STAGES_RADIOSITY_H
+
+#include "renderer/stages/droplets.h"
+#include "renderer/stages/field.h"
+#include "renderer/stages/sky.h"
+
+enum { RADIOSITY_PASS_COUNT = 4 };
+
+struct radiosity_stage {
+	struct pass *passes[RADIOSITY_PASS_COUNT];
+};
+
+struct radiosity_light {
+	const struct texture *ground_received; /* irradiance of the ground by sky and cloud base, W/m2/nm; the beam is not in it */
+	const struct texture *cloud_received;  /* irradiance of the cloud base by the ground */
+	double ground_diffuse[3];              /* mean of the first */
+	double ground_direct[3];               /* mean irradiance of the ground by the beam through the clouds, horizontal */
+	int passes;
+	double residual; /* what was on its way when the exchange stopped, over all that the ground receives */
+};
+
+bool radiosity_stage_init(struct radiosity_stage *stage, const struct pass_compiler *compiler);
+void radiosity_stage_finish(struct radiosity_stage *stage);
+
+/* Only for scenes with clouds. max_albedo: largest reflectance of the ground, 0..1. Fills in the block's air_below. The light stays valid
+ * for this frame. false (and a log line) when out of memory. */
+bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_context *context, const struct scene *scene, double max_albedo,
+			 const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab,
+			 struct radiosity_light *light);
+
+#endif

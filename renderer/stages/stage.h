@@ -1,0 +1,33 @@
+/* What the stages share: compiler of their passes, memory, and the uniform block that they fill one after the other.
+ *
+ * A stage is a function of named parts of the scene. It looks up its result in the cache, under those parts alone, computes what is
+ * missing, and writes what later stages need into the block. All stages run on the thread that owns the context.
+ */
+#ifndef STRATUS_RENDERER_STAGES_STAGE_H
+#define STRATUS_RENDERER_STAGES_STAGE_H
+
+#include "renderer/cache.h"
+#include "renderer/gl/pass.h"
+#include "renderer/gl/texture.h"
+#include "renderer/scene.h"
+#include "renderer/scene_block.h"
+
+struct stage_context {
+	struct cache *cache;
+	struct scene_block block;
+	unsigned block_buffer; /* OpenGL name of the uniform buffer */
+	const struct kernel *kernel;
+	bool reused; /* set false by a stage that computed anything */
+};
+
+/* Makes the block as it stands visible to the passes that follow. */
+void stage_upload_block(struct stage_context *context);
+
+/* Reads one level of a float texture back: `components` (1 or 4) floats a texel. Waits for the GPU: for small results alone. */
+void stage_read_texture(const struct texture *texture, int level, int components, float *values);
+
+/* Creates a list of passes; all or none. */
+bool stage_create_passes(const struct pass_compiler *compiler, const struct pass_desc *descs, struct pass **passes, int count);
+void stage_destroy_passes(struct pass **passes, int count);
+
+#endif

@@ -1,0 +1,244 @@
+#include "renderer/stages/view.h"
+
+#include "renderer/log.h"
+#include "renderer/stages/colour.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#define VIEW_SAMPLERS                                                                                                                      \
+	{                                                                                                                                  \
+		"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "field_coarse", "field_detail",              \
+			"height_table", "height_maximum", "phase_table", "forward_peak_table", "forward_blur_table", "slab_sun_table",     \
+			"slab_view_table", "ground_received", "cloud_received"                                                             \
+	}
+
+static const struct pass_desc one_desc = {
+	.file = "shaders/passes/view.glsl", .defines = "#define OUTPUTS 1\n", .outputs = 1, .samplers = VIEW_SAMPLERS};
+static const struct pass_desc four_desc = {
+	.file = "shaders/passes/view.glsl", .defines = "#define OUTPUTS 4\n", .outputs = VIEW_OUTPUTS, .samplers = VIEW_SAMPLERS};
+static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
+
+bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
+{
+	stage->one = pass_create(compiler, &one_desc);
+	stage->four = stage->one ? pass_create(compiler, &four_desc) : NULL;
+	stage->develop = stage->four ? pass_create(compiler, &develop_desc) : NULL;
+	if (!stage->develop) {
+		view_stage_finish(stage);
+		return false;
+	}
+	return true;
+}
+
+void view_stage_finish(struct view_stage *stage)
+{
+	pass_destroy(stage->develop);
+	pass_destroy(stage->four);
+	pass_destroy(stage->one);
+	*stage = (struct view_stage){0};
+}
+
+static void set4(float *to, double x, double y, double z, double w)
+{
+	to[0] = (float)x;
+	to[1] = (float)y;
+	to[2] = (float)z;
+	to[3] = (float)w;
+}
+
+/* Camera axes: forward by azimuth and elevation, up towards the zenith (at the poles: what azimuth points to), then rolled. A positive roll
+ * turns the picture clockwise, so the camera itself anticlockwise. */
+static void fill_camera(struct scene_block *block, const struct scene *scene)
+{
+	const struct scene_camera *camera = &scene->camera;
+	const double a = camera->azimuth_deg * M_PI / 180, e = camera->elevation_deg * M_PI / 180, roll = camera->roll_deg * M_PI / 180;
+	const double right[3] = {cos(a), -sin(a), 0};
+	const double up[3] = {-sin(e) * sin(a), -sin(e) * cos(a), cos(e)};
+	double rolled_right[3], rolled_up[3];
+	for (int i = 0; i < 3; i++) {
+		rolled_right[i] = cos(roll) * right[i] + sin(roll) * up[i];
+		rolled_up[i] = cos(roll) * up[i] - sin(roll) * right[i];
+	}
+	const double tan_v = tan(0.5 * camera->vertical_fov_deg * M_PI / 180);
+	const double tan_h = tan_v * scene->output.width / scene->output.height;
+	const double tile = scene->clouds.tile_m;
+	const double x = camera->position_m[0], y = camera->position_m[1];
+	set4(block->camera_position, x - tile * floor(x / tile), y - tile * floor(y / tile), camera->position_m[2],
+	     2 * tan_v / scene->output.height);
+	set4(block->camera_right, rolled_right[0], rolled_right[1], rolled_right[2], tan_h);
+	set4(block->camera_up, rolled_up[0], rolled_up[1], rolled_up[2], tan_v);
+	set4(block->camera_forward, cos(e) * sin(a), cos(e) * cos(a), sin(e), camera->projection);
+	set4(block->image_size, scene->output.width, scene->output.height, 1.0 / scene->output.width, 1.0 / scene->output.height);
+}
+
+void view_fill_block(struct scene_block *block, const struct scene *scene)
+{
+	const struct scene_ground *ground = &scene->ground;
+	const bool lambert = ground->type == GROUND_LAMBERT;
+	double matrix[3][3];
+	fill_camera(block, scene);
+	set4(block->ground_albedo, ground->albedo_scale * (lambert ? ground->albedo[0] : 1),
+	     ground->albedo_scale * (lambert ? ground->albedo[1] : 1), ground->albedo_scale * (lambert ? ground->albedo[2] : 1),
+	     ground->type);
+	block->ground_mean_albedo[3] = (float)scene->clouds.tile_m;
+	colour_band_matrix(matrix);
+	set4(block->band_red, matrix[0][0], matrix[1][0], matrix[2][0], 0);
+	set4(block->band_green, matrix[0][1], matrix[1][1], matrix[2][1], 0);
+	set4(block->band_blue, matrix[0][2], matrix[1][2], matrix[2][2], 0);
+}
+
+static struct cache_key make_key(const struct scene *scene, enum layer layer)
+{
+	const struct scene_clouds *clouds = &scene->clouds;
+	const struct scene_camera *camera = &scene->camera;
+	const double inputs[] = {layer,
+				 scene->output.width,
+				 scene->output.height,
+				 camera->position_m[0],
+				 camera->position_m[1],
+				 camera->position_m[2],
+				 camera->azimuth_deg,
+				 camera->elevation_deg,
+				 camera->roll_deg,
+				 camera->vertical_fov_deg,
+				 camera->projection,
+				 scene->sun.elevation_deg,
+				 scene->sun.azimuth_deg,
+				 scene->dsd.n0_per_cm3,
+				 scene->dsd.gamma,
+				 scene->dsd.effective_radius_um,
+				 clouds->type,
+				 clouds->seed,
+				 clouds->time_s,
+				 clouds->coverage,
+				 clouds->base_m,
+				 clouds->thickness_m,
+				 clouds->tile_m,
+				 clouds->resolution,
+				 clouds->wind_mps[0],
+				 clouds->wind_mps[1],
+				 scene->ground.type,
+				 scene->ground.albedo[0],
+				 scene->ground.albedo[1],
+				 scene->ground.albedo[2],
+				 scene->ground.albedo_scale,
+				 scene->atmosphere.aerosol_optical_depth,
+				 scene->atmosphere.ozone_du,
+				 scene->radiosity.enabled,
+				 scene->radiosity.tolerance,
+				 scene->radiosity.max_passes,
+				 scene->model.shading,
+				 scene->model.optics};
+	struct cache_key key = cache_key_make("view");
+	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
+		cache_key_add(&key, inputs[i]);
+	return key;
+}
+
+static void picture_destroy(void *value)
+{
+	struct texture *picture = value;
+	texture_finish(picture);
+	free(picture);
+}
+
+static struct texture *picture_create(const struct scene *scene)
+{
+	struct texture *picture = calloc(1, sizeof *picture);
+	if (picture && !texture_init(picture, scene->output.width, scene->output.height, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
+		free(picture);
+		picture = NULL;
+	}
+	if (!picture)
+		log_error("view: out of memory");
+	return picture;
+}
+
+static void bind_inputs(struct pass_run *run, const struct view_inputs *in)
+{
+	const struct texture *samplers[PASS_SAMPLERS_MAX] = {in->sky->transmittance,
+							     in->sky->total,
+							     in->sky->near,
+							     in->sky->to_layer,
+							     in->sky->to_end,
+							     in->field->coarse,
+							     in->field->detail,
+							     in->field->height,
+							     in->field->maximum,
+							     &in->droplets->phase,
+							     &in->droplets->forward_peak,
+							     &in->droplets->forward_blur,
+							     &in->slab->sun,
+							     &in->slab->view,
+							     in->light ? in->light->ground_received : NULL,
+							     in->light ? in->light->cloud_received : NULL};
+	for (int i = 0; i < PASS_SAMPLERS_MAX; i++)
+		run->samplers[i] = samplers[i];
+}
+
+/* Renders `count` layers (1 or VIEW_OUTPUTS) in one pass and hands them to the cache. */
+static bool run_group(const struct view_stage *stage, struct stage_context *context, const struct scene *scene,
+		      const struct view_inputs *inputs, const enum layer *layers, int count, const struct texture **pictures)
+{
+	struct texture *targets[VIEW_OUTPUTS] = {0};
+	struct pass_run run = {.targets = targets};
+	bind_inputs(&run, inputs);
+	for (int i = 0; i < count; i++) {
+		run.arguments[0][i] = (float)layers[i];
+		targets[i] = picture_create(scene);
+		if (!targets[i])
+			goto fail;
+	}
+	pass_run(count == 1 ? stage->one : stage->four, &run);
+	for (int i = 0; i < count; i++) {
+		const struct cache_key key = make_key(scene, layers[i]);
+		struct texture *picture = targets[i];
+		targets[i] = NULL;
+		if (!cache_keep(context->cache, &key, picture, texture_bytes(picture), picture_destroy))
+			goto fail;
+		pictures[i] = picture;
+	}
+	return true;
+
+fail:
+	for (int i = 0; i < count; i++)
+		if (targets[i])
+			picture_destroy(targets[i]);
+	return false;
+}
+
+bool view_stage_run(const struct view_stage *stage, struct stage_context *context, const struct scene *scene,
+		    const struct view_inputs *inputs, const enum layer *layers, int count, renderer_cancelled *cancelled,
+		    void *cancel_context, const struct texture **pictures)
+{
+	enum layer missing[LAYER_COUNT];
+	int place[LAYER_COUNT], missing_count = 0;
+	for (int i = 0; i < count; i++) {
+		const struct cache_key key = make_key(scene, layers[i]);
+		pictures[i] = cache_find(context->cache, &key);
+		if (!pictures[i]) {
+			place[missing_count] = i;
+			missing[missing_count++] = layers[i];
+		}
+	}
+	if (missing_count > 0)
+		context->reused = false;
+	for (int i = 0; i < missing_count;) {
+		if (cancelled && cancelled(cancel_context))
+			return false;
+		const int group = missing_count - i >= VIEW_OUTPUTS ? VIEW_OUTPUTS : 1;
+		const struct texture *made[VIEW_OUTPUTS] = {0};
+		if (!run_group(stage, context, scene, inputs, missing + i, group, made))
+			return false;
+		for (int k = 0; k < group; k++)
+			pictures[place[i + k]] = made[k];
+		i += group;
+	}
+	return true;
+}
+
+void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)
+{
+	pass_run(stage->develop, &(struct pass_run){.targets = &target, .samplers = {picture}});
+}

@@ -1,0 +1,40 @@
+/* The view stage: the picture seen by the camera, as scene-linear layers; and the develop stage, exposure and tone for a screen.
+ *
+ * Depends on everything but the output's encoding.
+ */
+#ifndef STRATUS_RENDERER_STAGES_VIEW_H
+#define STRATUS_RENDERER_STAGES_VIEW_H
+
+#include "renderer/stages/radiosity.h"
+
+enum { VIEW_OUTPUTS = 4 };
+
+struct view_stage {
+	struct pass *one, *four; /* the view pass with one output, and with VIEW_OUTPUTS */
+	struct pass *develop;
+};
+
+struct view_inputs {
+	const struct droplets *droplets;
+	const struct slab_tables *slab;
+	const struct sky_tables *sky;
+	const struct field_maps *field;
+	const struct radiosity_light *light; /* NULL without clouds */
+};
+
+bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler);
+void view_stage_finish(struct view_stage *stage);
+
+/* Fills in the block's camera. Call before any pass runs, since the sky is tabulated from the camera's height. */
+void view_fill_block(struct scene_block *block, const struct scene *scene);
+
+/* Renders layers[0..count) into textures of the output's size (RGBA32F), owned by the cache and valid for this frame. cancelled may be
+ * NULL; it is asked between passes. false when cancelled or out of memory. */
+bool view_stage_run(const struct view_stage *stage, struct stage_context *context, const struct scene *scene,
+		    const struct view_inputs *inputs, const enum layer *layers, int count, renderer_cancelled *cancelled,
+		    void *cancel_context, const struct texture **pictures);
+
+/* Exposure, tone and sRGB of a picture into `target` (RGBA8 or RGBA16). Reads the block's develop member. */
+void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target);
+
+#endif

@@ -1,0 +1,99 @@
+// Deterministic noise on periodic lattices that lives in time instead of sliding (Perlin and Neyret 2001, "Flow Noise").
+#include "shaders/lib/scene_block.glsl"
+
+// Integer hash with full avalanche (Wellons 2018, "lowbias32").
+uint noise_hash(uint x)
+{
+	x ^= x >> 16u;
+	x *= 0x7feb352du;
+	x ^= x >> 15u;
+	x *= 0x846ca68bu;
+	x ^= x >> 16u;
+	return x;
+}
+
+uint noise_hash2(int x, int y, uint seed)
+{
+	return noise_hash(uint(x) + noise_hash(uint(y) + noise_hash(seed)));
+}
+
+// 0..1
+float noise_unit(uint hash)
+{
+	return float(hash >> 8u) * (1.0 / 16777216.0);
+}
+
+int noise_wrap(int i, int period)
+{
+	int m = i - i / period * period;
+	return m < 0 ? m + period : m;
+}
+
+// One lattice gradient's contribution; the gradient turns with time, each at a speed of its own.
+float noise_corner(int x, int y, int period, uint seed, float turns, vec2 offset)
+{
+	uint h = noise_hash2(noise_wrap(x, period), noise_wrap(y, period), seed);
+	float speed = noise_unit(h) < 0.5 ? -1.0 : 1.0;
+	float angle = 2.0 * PI * (noise_unit(noise_hash(h)) + speed * (0.6 + 0.8 * noise_unit(noise_hash(h + 7u))) * turns);
+	return dot(vec2(cos(angle), sin(angle)), offset);
+}
+
+// Gradient noise of unit variance (nearly) on a lattice of unit cells that repeats after `period` cells. turns: how often gradients have turned.
+float noise_gradient(vec2 p, int period, uint seed, float turns)
+{
+	vec2 cell = floor(p);
+	vec2 f = p - cell;
+	int x = int(cell.x);
+	int y = int(cell.y);
+	vec2 w = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
+	float a = noise_corner(x, y, period, seed, turns, f);
+	float b = noise_corner(x + 1, y, period, seed, turns, f - vec2(1.0, 0.0));
+	float c = noise_corner(x, y + 1, period, seed, turns, f - vec2(0.0, 1.0));
+	float d = noise_corner(x + 1, y + 1, period, seed, turns, f - vec2(1.0, 1.0));
+	// 3.9: reciprocal standard deviation of gradient noise with unit gradients and quintic weights.
+	return 3.9 * mix(mix(a, b, w.x), mix(c, d, w.x), w.y);
+}
+
+// Sum of octaves from `period` cells a tile, each twice as fine; gain 2^(-1/3) an octave is the k^(-8/3) spectrum in the plane (k^(-5/3) along a line)
+// of liquid water in stratiform cloud. Unit variance. p in tiles. Small eddies turn faster, as size to the power of 2/3.
+float noise_turbulence(vec2 p, int period, int octaves, uint seed, float turns)
+{
+	float sum = 0.0;
+	float weight = 1.0;
+	float power = 0.0;
+	for (int i = 0; i < octaves; i++) {
+		// A shift of its own for each octave keeps their lattices apart.
+		vec2 shift = vec2(noise_unit(noise_hash(seed + 31u * uint(i))), noise_unit(noise_hash(seed + 57u * uint(i) + 11u)));
+		sum += weight * noise_gradient((p + shift) * float(period), period, seed + 101u * uint(i), turns);
+		power += weight * weight;
+		weight *= 0.7937;
+		turns *= 1.5874;
+		period *= 2;
+	}
+	return sum / sqrt(power);
+}
+
+// Convective cells: 1 in the middle of a cell, 0 at its border and beyond: 1 - (distance/reach)^2 to the nearest centre. Each centre grows, moves to another place and
+// shrinks again over a life of its own; `lives`: how many lives have passed. p in lattice cells, repeating after `period`.
+float noise_cells(vec2 p, int period, uint seed, float lives, float reach)
+{
+	vec2 cell = floor(p);
+	float nearest = 9.0;
+	for (int dy = -1; dy <= 1; dy++) {
+		for (int dx = -1; dx <= 1; dx++) {
+			int x = int(cell.x) + dx;
+			int y = int(cell.y) + dy;
+			uint h = noise_hash2(noise_wrap(x, period), noise_wrap(y, period), seed);
+			float age = lives + noise_unit(h) * 16.0;
+			float generation = floor(age);
+			age -= generation;
+			uint place = noise_hash(h + uint(int(generation)) * 7919u);
+			vec2 centre = vec2(float(x), float(y)) + vec2(noise_unit(place), noise_unit(noise_hash(place)));
+			// At birth and death a centre is so weak that its neighbours take its place.
+			float weakness = 1.0 - smoothstep(0.0, 0.2, age) * (1.0 - smoothstep(0.8, 1.0, age));
+			vec2 away = centre - p;
+			nearest = min(nearest, dot(away, away) + 2.0 * weakness);
+		}
+	}
+	return max(0.0, 1.0 - nearest / (reach * reach));
+}

@@ -1,0 +1,16 @@
+// The develop stage: exposure, tone and sRGB encoding of a finished picture.
+#include "shaders/lib/colour.glsl"
+
+uniform sampler2D picture;
+
+void pass(ivec2 pixel)
+{
+	vec3 rgb = colour_into_gamut(vec3(texelFetch(picture, pixel, 0))) * exp2(develop.y);
+	if (develop.z < 0.5)
+		rgb = vec3(colour_filmic(rgb.x), colour_filmic(rgb.y), colour_filmic(rgb.z));
+	rgb = min(rgb, vec3(1.0));
+	rgb = vec3(colour_srgb(rgb.x), colour_srgb(rgb.y), colour_srgb(rgb.z));
+	if (develop.w < 256.0)
+		rgb += colour_dither(pixel) / develop.w;
+	STORE(0, vec4(clamp(rgb, 0.0, 1.0), 1.0));
+}

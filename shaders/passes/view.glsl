@@ -1,0 +1,34 @@
+// The view stage: parts of the picture, chosen by `arguments`: for output i the layer arguments[i / 4][i % 4] (enum layer).
+#include "shaders/lib/view.glsl"
+#include "shaders/lib/colour.glsl"
+
+vec3 view_layer(view_parts p, int layer)
+{
+	switch (layer) {
+	case 0: return colour_of_bands(view_sum(p));
+	case 1: return colour_of_bands(p.sun_direct);
+	case 2: return colour_of_bands(p.order0);
+	case 3: return colour_of_bands(p.order1);
+	case 4: return colour_of_bands(p.order2);
+	case 5: return colour_of_bands(p.multiple);
+	case 6: return colour_of_bands(p.cloud_sky);
+	case 7: return colour_of_bands(p.cloud_ground);
+	case 8: return colour_of_bands(p.sky);
+	case 9: return colour_of_bands(p.ground);
+	case 10: return colour_of_bands(p.air);
+	case 11: return p.transmittance;
+	case 12: return vec3(p.optical_thickness);
+	default: return vec3(p.distance);
+	}
+}
+
+void pass(ivec2 pixel)
+{
+	view_parts parts = view_ray(camera_ray(vec2(pixel) + 0.5));
+	STORE(0, vec4(view_layer(parts, int(arguments[0].x)), 1.0));
+#if OUTPUTS > 1
+	STORE(1, vec4(view_layer(parts, int(arguments[0].y)), 1.0));
+	STORE(2, vec4(view_layer(parts, int(arguments[0].z)), 1.0));
+	STORE(3, vec4(view_layer(parts, int(arguments[0].w)), 1.0));
+#endif
+}

@@ -1,0 +1,107 @@
+#!/bin/bash
+# Runs every test against the programs in BUILD_DIR: test.sh BUILD_DIR. The last line is "N passed, N failed".
+# After the plain build the tests of programs are repeated with sanitizers; STRATUS_QUICK=1 leaves that out.
+set -uo pipefail
+B=${1:-build}
+SAN=${SAN:-}
+python=/usr/bin/python3 # Debian's, which sees the packages installed for the tests
+results=$(mktemp -d)
+trap 'rm -rf "$results"' EXIT
+passed=0 failed=0
+
+count() { # count PASSED FAILED
+	passed=$((passed + $1))
+	failed=$((failed + $2))
+}
+
+# One unit test program. cmocka's own count where it ended in order, else one failure; 77 means that it cannot run here.
+run_unit() {
+	local program=$1 output status ok bad
+	echo "== ${program#"$B"/}"
+	output=$(timeout 600 "$program" 2>&1)
+	status=$?
+	if [ $status = 77 ]; then
+		echo "skipped"
+		return
+	fi
+	ok=$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p' <<<"$output" | tail -1)
+	bad=$(sed -n 's/^\[  FAILED  \] \([0-9]*\) test.*/\1/p' <<<"$output" | tail -1)
+	if [ $status != 0 ] && [ "${bad:-0}" = 0 ]; then
+		bad=1
+	elif [ $status = 0 ] && [ -z "$ok" ]; then
+		ok=1 # a program without cmocka
+	fi
+	[ $status = 0 ] || echo "$output (exit status $status)"
+	echo "${ok:-0} passed, ${bad:-0} failed in ${program##*/}"
+	count "${ok:-0}" "${bad:-0}"
+}
+
+run_units() {
+	local program
+	for program in "$B"/tests/test_*; do
+		[ -x "$program" ] && [ -f "$program" ] && run_unit "$program"
+	done
+}
+
+# Folders of pytest; the counts come from its report. Five: no tests there.
+run_pytest() {
+	local report=$results/$RANDOM.xml status counts
+	echo "== pytest $*"
+	STRATUS_BUILD=$B $python -m pytest -q -p no:cacheprovider --junitxml="$report" "$@"
+	status=$?
+	[ $status = 5 ] && return
+	counts=$($python - "$report" <<'END'
+import sys, xml.etree.ElementTree as tree
+suites = list(tree.parse(sys.argv[1]).iter("testsuite"))
+total = lambda name: sum(int(suite.get(name, 0)) for suite in suites)
+bad = total("failures") + total("errors")
+print(total("tests") - bad - total("skipped"), bad)
+END
+	) || counts="0 1"
+	[ $status != 0 ] && [ "${counts#* }" = 0 ] && counts="${counts% *} 1"
+	# shellcheck disable=SC2086
+	count $counts
+}
+
+run_format() {
+	echo "== clang-format"
+	if find renderer server clients tests shaders \( -name '*.[ch]' -o -name '*.cpp' \) -print0 |
+		xargs -0 clang-format --dry-run -Werror; then
+		count 1 0
+	else
+		count 0 1
+	fi
+}
+
+# The same programs built with sanitizers, in a process of its own whose last line is its count.
+run_sanitized() {
+	local log=$results/sanitized counts
+	echo "== again with SAN=address,undefined"
+	if make --no-print-directory -j"$(nproc)" SAN=address,undefined programs unit >"$log" 2>&1; then
+		SAN=address,undefined scripts/test.sh build/san-address-undefined 2>&1 | tee "$log" | sed '$d'
+	else
+		cat "$log"
+	fi
+	counts=$(sed -n '$s/^\([0-9]*\) passed, \([0-9]*\) failed$/\1 \2/p' "$log")
+	# shellcheck disable=SC2086
+	count ${counts:-0 1}
+}
+
+if [ -n "$SAN" ]; then
+	# Mesa keeps what it allocated until the process ends; lsan.supp names its libraries and nothing of ours.
+	export ASAN_OPTIONS=${ASAN_OPTIONS:-detect_leaks=1:detect_stack_use_after_return=0}
+	export LSAN_OPTIONS=${LSAN_OPTIONS:-suppressions=$PWD/scripts/lsan.supp:print_suppressions=0}
+	export UBSAN_OPTIONS=${UBSAN_OPTIONS:-print_stacktrace=1}
+fi
+
+run_units
+if [ -n "$SAN" ]; then
+	run_pytest tests/http
+else
+	run_pytest tests/http tests/client
+	run_format
+	[ "${STRATUS_QUICK:-0}" = 1 ] || run_sanitized
+fi
+
+echo "$passed passed, $failed failed"
+[ $failed = 0 ] && [ $passed -gt 0 ]

@@ -4,24 +4,33 @@
 
 #include <stdio.h>
 
-static int print_presets(const json_t *presets, const char *wanted)
+static const char *text(const json_t *preset, const char *name)
 {
-	const char *name;
-	json_t *scene;
-	if (wanted) {
-		scene = json_object_get(presets, wanted);
-		if (!scene) {
-			client_error("there is no preset \"%s\"; stratus presets lists them", wanted);
-			return CLIENT_USAGE;
-		}
-		json_dumpf(scene, stdout, JSON_INDENT(2));
-		putchar('\n');
-	} else {
-		json_object_foreach((json_t *)presets, name, scene)
-		{
-			puts(name);
-		}
+	const char *found = json_string_value(json_object_get(preset, name));
+	return found ? found : "";
+}
+
+static int print_list(const struct client *client, const json_t *presets)
+{
+	size_t i;
+	json_t *preset;
+	json_array_foreach(presets, i, preset)
+	{
+		if (client->quiet)
+			puts(text(preset, "name"));
+		else
+			printf("%-18s %s\n", text(preset, "name"), text(preset, "title"));
 	}
+	return fflush(stdout) == 0 ? CLIENT_OK : CLIENT_UNWRITABLE;
+}
+
+static int print_scene(const json_t *presets, const char *name)
+{
+	const json_t *scene = preset_list_find(presets, name);
+	if (!scene)
+		return CLIENT_USAGE;
+	json_dumpf(scene, stdout, JSON_INDENT(2));
+	putchar('\n');
 	return fflush(stdout) == 0 ? CLIENT_OK : CLIENT_UNWRITABLE;
 }
 
@@ -41,7 +50,7 @@ static int run_presets(struct client *client, int argc, char **argv)
 	json_t *presets;
 	int status = preset_list_fetch(client, &presets);
 	if (status == CLIENT_OK)
-		status = print_presets(presets, argv[optind]);
+		status = argv[optind] ? print_scene(presets, argv[optind]) : print_list(client, presets);
 	json_decref(presets);
 	return status;
 }
@@ -50,6 +59,6 @@ const struct command command_presets = {
 	.name = "presets",
 	.arguments = "[NAME]",
 	.summary = "list the daemon's scenes, or print one",
-	.help = "",
+	.help = "With -q the names stand alone.\n\n",
 	.run = run_presets,
 };

@@ -60,11 +60,8 @@ static int take_preset(const struct client *client, const char *name, json_t **s
 	json_t *presets;
 	int status = preset_list_fetch(client, &presets);
 	if (status == CLIENT_OK) {
-		*scene = json_incref(json_object_get(presets, name));
-		if (!*scene) {
-			client_error("there is no preset \"%s\"; stratus presets lists them", name);
-			status = CLIENT_USAGE;
-		}
+		*scene = json_incref(preset_list_find(presets, name));
+		status = *scene ? CLIENT_OK : CLIENT_USAGE;
 	}
 	json_decref(presets);
 	return status;

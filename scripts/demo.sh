@@ -17,7 +17,7 @@ if ! daemon_await; then
 fi
 export STRATUS_SERVER=$daemon_url
 
-mapfile -t presets < <("$B/stratus" presets)
+mapfile -t presets < <("$B/stratus" presets -q)
 [ "${#presets[@]}" -ge 4 ] || { echo "the daemon lists ${#presets[@]} presets, four are wanted" >&2; exit 1; }
 for i in 0 1 2 3; do
 	extension=png

@@ -13,7 +13,10 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = ROOT / os.environ.get("STRATUS_BUILD", "build")
 IMAGE = b"\x89PNG not really" * 1000
-PRESETS = {"noon": {"sun": {"elevation_deg": 60}}, "dusk": {"sun": {"elevation_deg": 2}}}
+PRESETS = [
+    {"name": "noon", "title": "High sun", "description": "", "scene": {"sun": {"elevation_deg": 60}}},
+    {"name": "dusk", "title": "Low sun", "description": "", "scene": {"sun": {"elevation_deg": 2}}},
+]
 PROBLEM = {
     "type": "about:blank",
     "title": "The scene is refused",
@@ -39,7 +42,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def do_GET(self):
         self.server.seen.append(self)
         if self.path == "/v1/presets":
-            self.answer(200, "application/json", json.dumps(PRESETS).encode())
+            self.answer(200, "application/json", json.dumps({"presets": PRESETS}).encode())
         else:
             self.answer(self.server.health, "text/plain", b"words\n")
 
@@ -152,8 +155,12 @@ def test_unknown_preset(server, tmp_path):
 
 
 def test_presets(server):
-    assert stratus(server, "presets").stdout.decode().split() == list(PRESETS)
-    assert json.loads(stratus(server, "presets", "noon").stdout) == PRESETS["noon"]
+    assert [line.split(maxsplit=1) for line in stratus(server, "presets").stdout.decode().splitlines()] == [
+        ["noon", "High sun"],
+        ["dusk", "Low sun"],
+    ]
+    assert stratus(server, "presets", "-q").stdout == b"noon\ndusk\n"
+    assert json.loads(stratus(server, "presets", "noon").stdout) == PRESETS[0]["scene"]
     assert stratus(server, "presets", "night").returncode == 2
 
 

@@ -38,7 +38,7 @@ CLIENT_SRC := $(wildcard clients/*.c)
 UNIT_SRC := $(wildcard tests/unit/test_*.c)
 UNIT_CXX := $(wildcard tests/unit/test_*.cpp)
 SHADERS := $(wildcard shaders/*.glsl shaders/*/*.glsl)
-RESOURCES := openapi.yaml $(wildcard server/presets/*.json)
+RESOURCES := openapi.yaml server/pages/index.html $(wildcard server/presets/*.json)
 
 obj = $(patsubst %,$(B)/%.o,$(1))
 RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o

@@ -1,0 +1,248 @@
+#include "server/config.h"
+
+#include "renderer/log.h"
+
+#include <errno.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum option_type { OPTION_TEXT, OPTION_INTEGER, OPTION_FLAG, OPTION_CHOICE };
+
+struct option {
+	const char *name, *variable, *value_name, *help;
+	enum option_type type;
+	size_t offset;
+	int low, high;              /* of an integer */
+	const char *const *choices; /* ends with NULL */
+};
+
+static const char *const pass_names[] = {[PASS_AUTO] = "auto", [PASS_FRAGMENT] = "fragment", [PASS_COMPUTE] = "compute", NULL};
+static const char *const level_names[] = {
+	[LOG_ERROR] = "error", [LOG_WARNING] = "warning", [LOG_INFO] = "info", [LOG_DEBUG] = "debug", NULL};
+
+#define AT(member) .offset = offsetof(struct config, member)
+
+/* clang-format off */
+static const struct option options[] = {
+	{"--listen", "STRATUS_LISTEN", "HOST:PORT", "address to serve on; port 0: any free one",
+	 OPTION_TEXT, AT(listen)},
+	{"--state-dir", "STRATUS_STATE_DIR", "DIR", "where the daemon keeps files of its own",
+	 OPTION_TEXT, AT(state_dir)},
+	{"--kernel", "STRATUS_KERNEL", "FILE", "Mie kernel table (mie.kernel beside the program, then in the state directory)",
+	 OPTION_TEXT, AT(kernel)},
+	{"--device", "STRATUS_DEVICE", "N", "EGL device; -1: the first hardware device, else software",
+	 OPTION_INTEGER, AT(device), .low = -1, .high = 1024},
+	{"--require-gpu", "STRATUS_REQUIRE_GPU", NULL, "refuse to run on software rendering",
+	 OPTION_FLAG, AT(require_gpu)},
+	{"--pass", "STRATUS_PASS", "KIND", "how full-screen passes run: auto (measured), fragment, compute",
+	 OPTION_CHOICE, AT(pass_kind), .choices = pass_names},
+	{"--shader-dir", "STRATUS_SHADER_DIR", "DIR", "read shaders from here instead of the built-in ones",
+	 OPTION_TEXT, AT(shader_dir)},
+	{"--image-module", "STRATUS_IMAGE_MODULE", "FILE", "the module that writes images (stratus-image.so beside the program)",
+	 OPTION_TEXT, AT(image_module)},
+	{"--queue-length", "STRATUS_QUEUE_LENGTH", "N", "renders that may wait; more are answered 503",
+	 OPTION_INTEGER, AT(queue_length), .low = 1, .high = 65536},
+	{"--workers", "STRATUS_WORKERS", "N", "threads that encode images; 0: one for each processor",
+	 OPTION_INTEGER, AT(workers), .low = 0, .high = 256},
+	{"--timeout-ms", "STRATUS_TIMEOUT_MS", "MS", "deadline of requests that state none (X-Timeout-Ms)",
+	 OPTION_INTEGER, AT(timeout_ms), .low = 1, .high = 3600000},
+	{"--cache-mb", "STRATUS_CACHE_MB", "MB", "memory of the renderer's stages on the GPU",
+	 OPTION_INTEGER, AT(cache_mb), .low = 1, .high = 1048576},
+	{"--log-level", "STRATUS_LOG_LEVEL", "LEVEL", "error, warning, info, debug",
+	 OPTION_CHOICE, AT(log_level), .choices = level_names},
+	{0},
+};
+/* clang-format on */
+
+static void *option_at(const struct option *option, struct config *config)
+{
+	return (char *)config + option->offset;
+}
+
+static bool set_integer(const struct option *option, const char *text, int *target)
+{
+	char *end;
+	errno = 0;
+	long value = strtol(text, &end, 10);
+	if (errno || end == text || *end || value < option->low || value > option->high)
+		return false;
+	*target = (int)value;
+	return true;
+}
+
+static bool set_flag(const char *text, bool *target)
+{
+	static const char *const words[] = {"0", "false", "no", "1", "true", "yes", NULL};
+	for (int i = 0; words[i]; i++)
+		if (strcmp(words[i], text) == 0) {
+			*target = i >= 3;
+			return true;
+		}
+	return false;
+}
+
+static bool set_choice(const struct option *option, const char *text, int *target)
+{
+	for (int i = 0; option->choices[i]; i++)
+		if (strcmp(option->choices[i], text) == 0) {
+			*target = i;
+			return true;
+		}
+	return false;
+}
+
+/* `source` is the flag or the variable, for the message. */
+static bool set_option(const struct option *option, const char *text, const char *source, struct config *config)
+{
+	void *target = option_at(option, config);
+	switch (option->type) {
+	case OPTION_TEXT:
+		if (*text) {
+			*(const char **)target = text;
+			return true;
+		}
+		fprintf(stderr, "stratusd: %s needs a value\n", source);
+		return false;
+	case OPTION_INTEGER:
+		if (set_integer(option, text, target))
+			return true;
+		fprintf(stderr, "stratusd: %s must be a whole number from %d to %d, not '%s'\n", source, option->low, option->high, text);
+		return false;
+	case OPTION_FLAG:
+		if (set_flag(text, target))
+			return true;
+		fprintf(stderr, "stratusd: %s must be 1 or 0, not '%s'\n", source, text);
+		return false;
+	case OPTION_CHOICE:
+		if (set_choice(option, text, target))
+			return true;
+		fprintf(stderr, "stratusd: %s: '%s' is none of %s\n", source, text, option->help);
+		return false;
+	}
+	return false;
+}
+
+static void print_value(const struct option *option, struct config *config)
+{
+	const void *value = option_at(option, config);
+	const char *text;
+	switch (option->type) {
+	case OPTION_TEXT:
+		text = *(const char *const *)value;
+		printf("%s", text ? text : "");
+		break;
+	case OPTION_INTEGER:
+		printf("%d", *(const int *)value);
+		break;
+	case OPTION_FLAG:
+		printf("%d", *(const bool *)value);
+		break;
+	case OPTION_CHOICE:
+		printf("%s", option->choices[*(const int *)value]);
+		break;
+	}
+}
+
+static void print_config(struct config *config)
+{
+	for (const struct option *option = options; option->name; option++) {
+		printf("%s=", option->variable);
+		print_value(option, config);
+		printf("\n");
+	}
+}
+
+static void print_help(struct config *defaults)
+{
+	printf("stratusd renders physically based cloudy skies on request, over HTTP.\n\nusage: stratusd [FLAG...]\n\n");
+	for (const struct option *option = options; option->name; option++) {
+		char flag[64];
+		snprintf(flag, sizeof flag, "%s %s", option->name, option->value_name ? option->value_name : "");
+		printf("  %-24s %s\n%27s%s [", flag, option->help, "", option->variable);
+		print_value(option, defaults);
+		printf("]\n");
+	}
+	printf("  --print-config           print the settings as environment variables and exit\n"
+	       "  --version                print the version and exit\n"
+	       "  --help                   print this and exit\n");
+}
+
+static void set_defaults(struct config *config)
+{
+	const char *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
+	*config = (struct config){
+		.listen = "127.0.0.1:8080",
+		.device = -1,
+		.pass_kind = PASS_AUTO,
+		.queue_length = 64,
+		.timeout_ms = 30000,
+		.cache_mb = 256,
+		.log_level = LOG_INFO,
+	};
+	if (state && *state == '/')
+		snprintf(config->state_dir_buffer, sizeof config->state_dir_buffer, "%s/stratus", state);
+	else
+		snprintf(config->state_dir_buffer, sizeof config->state_dir_buffer, "%s/.local/state/stratus", home ? home : "");
+	config->state_dir = config->state_dir_buffer;
+}
+
+static bool read_environment(struct config *config)
+{
+	for (const struct option *option = options; option->name; option++) {
+		const char *text = getenv(option->variable);
+		if (text && *text && !set_option(option, text, option->variable, config))
+			return false;
+	}
+	return true;
+}
+
+/* Reads argv[*index] as "--name value" or "--name=value" and moves past it. */
+static bool read_flag(int argc, char **argv, int *index, struct config *config)
+{
+	const char *flag = argv[(*index)++];
+	for (const struct option *option = options; option->name; option++) {
+		size_t length = strlen(option->name);
+		if (strncmp(flag, option->name, length) != 0 || (flag[length] && flag[length] != '='))
+			continue;
+		if (flag[length] == '=')
+			return set_option(option, flag + length + 1, option->name, config);
+		if (option->type == OPTION_FLAG)
+			return set_option(option, "1", option->name, config);
+		if (*index < argc)
+			return set_option(option, argv[(*index)++], option->name, config);
+		fprintf(stderr, "stratusd: %s needs a value\n", option->name);
+		return false;
+	}
+	fprintf(stderr, "stratusd: unknown flag '%s'; --help lists them\n", flag);
+	return false;
+}
+
+enum config_result config_parse(int argc, char **argv, struct config *config)
+{
+	bool print = false;
+	set_defaults(config);
+	if (!read_environment(config))
+		return CONFIG_BAD;
+	for (int i = 1; i < argc;) {
+		if (strcmp(argv[i], "--help") == 0) {
+			set_defaults(config);
+			print_help(config);
+			return CONFIG_DONE;
+		}
+		if (strcmp(argv[i], "--version") == 0) {
+			printf("stratus %s\n", RENDERER_VERSION);
+			return CONFIG_DONE;
+		}
+		if (strcmp(argv[i], "--print-config") == 0) {
+			print = true;
+			i++;
+		} else if (!read_flag(argc, argv, &i, config)) {
+			return CONFIG_BAD;
+		}
+	}
+	if (print)
+		print_config(config);
+	return print ? CONFIG_DONE : CONFIG_RUN;
+}

@@ -1,0 +1,31 @@
+/* Settings of the daemon: one table of flags, each with an environment variable. Flags win over the environment. */
+#ifndef STRATUS_SERVER_CONFIG_H
+#define STRATUS_SERVER_CONFIG_H
+
+#include "renderer/renderer.h"
+
+struct config {
+	const char *listen;       /* HOST:PORT, [IPv6]:PORT; port 0: any free one */
+	const char *state_dir;    /* never NULL after config_parse; made when first needed */
+	const char *kernel;       /* file of the Mie kernel table; NULL: looked for */
+	const char *shader_dir;   /* NULL: the embedded shaders */
+	const char *image_module; /* NULL: beside the program */
+	int device;               /* EGL device; -1: the first hardware device, else software */
+	bool require_gpu;
+	int pass_kind;    /* enum pass_kind */
+	int queue_length; /* 1..65536 */
+	int workers;      /* 1..256; 0: as many as processors */
+	int timeout_ms;   /* 1..3600000, when a request says none */
+	int cache_mb;     /* 1..1048576 */
+	int log_level;    /* enum log_level */
+
+	char state_dir_buffer[4096]; /* holds the default of state_dir */
+};
+
+enum config_result { CONFIG_RUN, CONFIG_DONE, CONFIG_BAD };
+
+/* Reads environment and flags. CONFIG_DONE: --help, --version or --print-config was answered on standard output. CONFIG_BAD: standard error
+ * says what is wrong. Strings point into argv and the environment. Main thread, before others exist. */
+enum config_result config_parse(int argc, char **argv, struct config *config);
+
+#endif

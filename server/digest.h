@@ -1,0 +1,12 @@
+/* SHA-256 of texts, for entity tags and keys. Any thread. */
+#ifndef STRATUS_SERVER_DIGEST_H
+#define STRATUS_SERVER_DIGEST_H
+
+#include <stddef.h>
+
+/* 128 bits in hexadecimal and a NUL: enough that two texts never share one. */
+enum { DIGEST_SIZE = 33 };
+
+void digest_of(const void *bytes, size_t size, char digest[static DIGEST_SIZE]);
+
+#endif

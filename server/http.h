@@ -1,0 +1,16 @@
+/* libmicrohttpd's callbacks: requests are made, read, given to their route and freed here. */
+#ifndef STRATUS_SERVER_HTTP_H
+#define STRATUS_SERVER_HTTP_H
+
+#include "server/service.h"
+
+/* Listens on config->listen and starts the HTTP threads; sets service->daemon, host and port. false and a log line on failure. */
+bool http_start(struct service *service);
+
+/* Stops listening; connections that exist go on. */
+void http_quiesce(struct service *service);
+
+/* Ends the threads and closes every connection. None may be suspended. */
+void http_stop(struct service *service);
+
+#endif

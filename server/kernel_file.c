@@ -1,0 +1,72 @@
+#include "server/kernel_file.h"
+
+#include "renderer/log.h"
+
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* mkdir -p */
+static bool make_directories(const char *path)
+{
+	char part[PATH_MAX];
+	if (snprintf(part, sizeof part, "%s", path) >= (int)sizeof part)
+		return false;
+	for (char *c = part + 1; *c; c++) {
+		if (*c != '/')
+			continue;
+		*c = '\0';
+		mkdir(part, 0755);
+		*c = '/';
+	}
+	return mkdir(part, 0755) == 0 || errno == EEXIST;
+}
+
+static bool beside_program(char path[static PATH_MAX])
+{
+	ssize_t length = readlink("/proc/self/exe", path, PATH_MAX - 1);
+	if (length <= 0)
+		return false;
+	path[length] = '\0';
+	char *name = strrchr(path, '/') + 1;
+	return snprintf(name, (size_t)(PATH_MAX - (name - path)), "mie.kernel") < PATH_MAX - (name - path);
+}
+
+static void report_progress(void *context, double done)
+{
+	int *tenths = context;
+	if ((int)(done * 10) > *tenths) {
+		*tenths = (int)(done * 10);
+		log_info("Mie kernel table: %d %%", *tenths * 10);
+	}
+}
+
+static struct kernel *generate(const char *path)
+{
+	int tenths = 0;
+	log_info("Mie kernel table: computing it once, for %s", path);
+	return kernel_generate(path, 0, report_progress, &tenths) ? kernel_load(path) : NULL;
+}
+
+struct kernel *kernel_file_open(const char *path, const char *state_dir)
+{
+	char buffer[PATH_MAX];
+	struct kernel *kernel = NULL;
+	if (path)
+		kernel = kernel_load(path);
+	else if (beside_program(buffer) && access(buffer, R_OK) == 0)
+		kernel = kernel_load(buffer);
+	if (kernel)
+		return kernel;
+
+	if (!make_directories(state_dir) || snprintf(buffer, sizeof buffer, "%s/mie.kernel", state_dir) >= (int)sizeof buffer) {
+		log_error("state directory %s: %s", state_dir, strerror(errno));
+		return NULL;
+	}
+	if (access(buffer, R_OK) == 0)
+		kernel = kernel_load(buffer);
+	return kernel ? kernel : generate(buffer);
+}

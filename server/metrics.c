@@ -1,0 +1,235 @@
+#include "server/metrics.h"
+
+#include "renderer/log.h"
+#include "server/text.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/optics", "/v1/sun", "/v1/presets", "/",
+						     "/openapi.yaml", "/healthz",   "/readyz", "/metrics",    "other"};
+static const char *const rejection_names[REJECTION_COUNT] = {"full", "starting", "shutting_down"};
+static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
+
+/* Every status that is sent; the last stands for all others. */
+static const unsigned statuses[] = {200, 304, 400, 404, 405, 406, 413, 415, 422, 499, 500, 503, 504, 0};
+enum { STATUS_COUNT = sizeof statuses / sizeof *statuses };
+
+/* Upper bounds in seconds: half a millisecond to a minute. */
+static const double bounds[] = {0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60};
+enum { BOUND_COUNT = sizeof bounds / sizeof *bounds };
+
+struct histogram {
+	unsigned long buckets[BOUND_COUNT + 1];
+	unsigned long count;
+	double sum;
+};
+
+struct metrics {
+	pthread_mutex_t mutex;
+	struct histogram requests[ROUTE_COUNT][STATUS_COUNT];
+	struct histogram stages[TIMING_COUNT];
+	unsigned long reused[TIMING_COUNT];
+	unsigned long rejected[REJECTION_COUNT];
+	unsigned long ended[END_COUNT];
+};
+
+struct metrics *metrics_create(void)
+{
+	struct metrics *metrics = calloc(1, sizeof *metrics);
+	if (!metrics) {
+		log_error("metrics_create: out of memory");
+		return NULL;
+	}
+	pthread_mutex_init(&metrics->mutex, NULL);
+	return metrics;
+}
+
+void metrics_destroy(struct metrics *metrics)
+{
+	if (!metrics)
+		return;
+	pthread_mutex_destroy(&metrics->mutex);
+	free(metrics);
+}
+
+static void observe(struct histogram *histogram, double seconds)
+{
+	int i = 0;
+	while (i < BOUND_COUNT && seconds > bounds[i])
+		i++;
+	histogram->buckets[i]++;
+	histogram->count++;
+	histogram->sum += seconds;
+}
+
+void metrics_count_request(struct metrics *metrics, enum metrics_route route, unsigned status, double milliseconds)
+{
+	int i = 0;
+	while (i < STATUS_COUNT - 1 && statuses[i] != status)
+		i++;
+	pthread_mutex_lock(&metrics->mutex);
+	observe(&metrics->requests[route][i], milliseconds * 1e-3);
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_timings(struct metrics *metrics, const struct timings *timings)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	for (int i = 0; i < TIMING_COUNT; i++) {
+		if (timings->entry[i].reused)
+			metrics->reused[i]++;
+		else if (timings->entry[i].measured)
+			observe(&metrics->stages[i], timings->entry[i].milliseconds * 1e-3);
+	}
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection reason)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->rejected[reason]++;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_end(struct metrics *metrics, enum metrics_end end)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->ended[end]++;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+static void write_family(struct text *text, const char *name, const char *type, const char *help)
+{
+	text_printf(text, "# TYPE stratus_%s %s\n# HELP stratus_%s %s\n", name, type, name, help);
+}
+
+/* labels: without braces and not empty. */
+static void write_histogram(struct text *text, const char *name, const char *labels, const struct histogram *histogram)
+{
+	unsigned long total = 0;
+	for (int i = 0; i < BOUND_COUNT; i++) {
+		total += histogram->buckets[i];
+		text_printf(text, "stratus_%s_bucket{%s,le=\"%g\"} %lu\n", name, labels, bounds[i], total);
+	}
+	text_printf(text, "stratus_%s_bucket{%s,le=\"+Inf\"} %lu\n", name, labels, histogram->count);
+	text_printf(text, "stratus_%s_count{%s} %lu\n", name, labels, histogram->count);
+	text_printf(text, "stratus_%s_sum{%s} %.6f\n", name, labels, histogram->sum);
+}
+
+static void request_labels(int route, int status, char *labels, size_t size)
+{
+	if (statuses[status])
+		snprintf(labels, size, "route=\"%s\",status=\"%u\"", route_names[route], statuses[status]);
+	else
+		snprintf(labels, size, "route=\"%s\",status=\"other\"", route_names[route]);
+}
+
+static void write_requests(struct text *text, const struct metrics *metrics)
+{
+	char labels[128];
+	write_family(text, "requests", "counter", "Requests by route and HTTP status; 499: the client left.");
+	for (int route = 0; route < ROUTE_COUNT; route++)
+		for (int status = 0; status < STATUS_COUNT; status++) {
+			request_labels(route, status, labels, sizeof labels);
+			if (metrics->requests[route][status].count)
+				text_printf(text, "stratus_requests_total{%s} %lu\n", labels, metrics->requests[route][status].count);
+		}
+	write_family(text, "request_duration_seconds", "histogram", "From the request line to the last byte of the answer.");
+	for (int route = 0; route < ROUTE_COUNT; route++)
+		for (int status = 0; status < STATUS_COUNT; status++) {
+			request_labels(route, status, labels, sizeof labels);
+			if (metrics->requests[route][status].count)
+				write_histogram(text, "request_duration_seconds", labels, &metrics->requests[route][status]);
+		}
+}
+
+static void write_stages(struct text *text, const struct metrics *metrics)
+{
+	char labels[64];
+	write_family(text, "stage_duration_seconds", "histogram", "Work of the stages of a render, those taken from memory left out.");
+	for (int i = 0; i < TIMING_COUNT; i++) {
+		snprintf(labels, sizeof labels, "stage=\"%s\"", timing_names[i]);
+		write_histogram(text, "stage_duration_seconds", labels, &metrics->stages[i]);
+	}
+	write_family(text, "stage_reused", "counter", "Stages of a render that were taken from memory.");
+	for (int i = 0; i < TIMING_COUNT; i++)
+		text_printf(text, "stratus_stage_reused_total{stage=\"%s\"} %lu\n", timing_names[i], metrics->reused[i]);
+}
+
+static void write_queue(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
+{
+	write_family(text, "queue_depth", "gauge", "Renders waiting.");
+	text_printf(text, "stratus_queue_depth %zu\n", now->queue_depth);
+	write_family(text, "queue_limit", "gauge", "Renders that may wait.");
+	text_printf(text, "stratus_queue_limit %zu\n", now->queue_limit);
+	write_family(text, "requests_in_flight", "gauge", "Requests begun and not ended, this one included.");
+	text_printf(text, "stratus_requests_in_flight %zu\n", now->requests_in_flight);
+	write_family(text, "queue_rejected", "counter", "Work refused, by reason.");
+	for (int i = 0; i < REJECTION_COUNT; i++)
+		text_printf(text, "stratus_queue_rejected_total{reason=\"%s\"} %lu\n", rejection_names[i], metrics->rejected[i]);
+	write_family(text, "renders_ended", "counter", "Accepted renders that brought no picture, by reason.");
+	for (int i = 0; i < END_COUNT; i++)
+		text_printf(text, "stratus_renders_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->ended[i]);
+}
+
+static void write_label(struct text *text, const char *name, const char *value)
+{
+	text_printf(text, "%s=\"", name);
+	for (; *value; value++) {
+		if (*value == '"' || *value == '\\')
+			text_add(text, "\\");
+		text_append(text, *value == '\n' ? " " : value, 1);
+	}
+	text_add(text, "\"");
+}
+
+static void write_infos(struct text *text, const struct renderer_info *info)
+{
+	write_family(text, "build", "info", "The running program.");
+	text_printf(text, "stratus_build_info{version=\"%s\"} 1\n", RENDERER_VERSION);
+	if (!info)
+		return;
+	write_family(text, "gl", "info", "The OpenGL in use.");
+	text_add(text, "stratus_gl_info{");
+	write_label(text, "vendor", info->vendor);
+	write_label(text, ",renderer", info->renderer);
+	write_label(text, ",version", info->version);
+	write_label(text, ",software", info->software ? "1" : "0");
+	text_add(text, "} 1\n");
+}
+
+static void write_process(struct text *text)
+{
+	unsigned long total = 0, resident = 0;
+	FILE *file = fopen("/proc/self/statm", "re");
+	if (!file)
+		return;
+	if (fscanf(file, "%lu %lu", &total, &resident) == 2) {
+		write_family(text, "process_resident_memory_bytes", "gauge", "Resident memory of the process.");
+		text_printf(text, "stratus_process_resident_memory_bytes %lu\n", resident * (unsigned long)sysconf(_SC_PAGESIZE));
+	}
+	fclose(file);
+}
+
+char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
+{
+	struct text text = {0};
+	pthread_mutex_lock(&metrics->mutex);
+	struct metrics *copy = malloc(sizeof *copy);
+	if (copy)
+		*copy = *metrics;
+	pthread_mutex_unlock(&metrics->mutex);
+	if (!copy)
+		return NULL;
+	write_requests(&text, copy);
+	write_stages(&text, copy);
+	write_queue(&text, copy, now);
+	write_infos(&text, now->info);
+	write_process(&text);
+	text_add(&text, "# EOF\n");
+	free(copy);
+	return text_take(&text);
+}

@@ -1,0 +1,49 @@
+/* Counters and histograms for /metrics, as OpenMetrics text. Any thread.
+ *
+ * Labels are bounded by construction: routes, statuses, stages and reasons are enumerations, never text of a request.
+ */
+#ifndef STRATUS_SERVER_METRICS_H
+#define STRATUS_SERVER_METRICS_H
+
+#include "server/server_timing.h"
+
+enum metrics_route {
+	ROUTE_RENDER,
+	ROUTE_OPTICS,
+	ROUTE_SUN,
+	ROUTE_PRESETS,
+	ROUTE_INDEX,
+	ROUTE_OPENAPI,
+	ROUTE_HEALTHZ,
+	ROUTE_READYZ,
+	ROUTE_METRICS,
+	ROUTE_OTHER,
+	ROUTE_COUNT
+};
+
+enum metrics_rejection { REJECTED_FULL, REJECTED_STARTING, REJECTED_SHUTTING_DOWN, REJECTION_COUNT };
+enum metrics_end { ENDED_EXPIRED, ENDED_ABANDONED, ENDED_FAILED, END_COUNT };
+
+struct metrics;
+
+struct metrics *metrics_create(void);
+void metrics_destroy(struct metrics *metrics);
+
+/* status: of HTTP; 499 when the client left before an answer. */
+void metrics_count_request(struct metrics *metrics, enum metrics_route route, unsigned status, double milliseconds);
+/* The stages of an answered render. Stages taken from memory are counted apart: their zeros would hide what the work costs. */
+void metrics_count_timings(struct metrics *metrics, const struct timings *timings);
+void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection reason);
+/* Renders that were accepted and brought no picture. */
+void metrics_count_end(struct metrics *metrics, enum metrics_end end);
+
+/* What is asked for at the moment of the scrape. info NULL: not ready yet. */
+struct metrics_now {
+	const struct renderer_info *info;
+	size_t queue_depth, queue_limit, requests_in_flight;
+};
+
+/* The caller frees; NULL when out of memory. */
+char *metrics_format(struct metrics *metrics, const struct metrics_now *now);
+
+#endif

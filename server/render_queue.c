@@ -1,0 +1,86 @@
+#include "server/render_queue.h"
+
+#include "renderer/log.h"
+#include "server/clock.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+
+struct render_queue {
+	pthread_mutex_t mutex;
+	pthread_cond_t changed;
+	struct render_job *first, **last;
+	size_t depth, limit;
+	bool closed;
+};
+
+struct render_queue *render_queue_create(size_t limit)
+{
+	struct render_queue *queue = calloc(1, sizeof *queue);
+	if (!queue) {
+		log_error("render_queue_create: out of memory");
+		return NULL;
+	}
+	pthread_mutex_init(&queue->mutex, NULL);
+	pthread_cond_init(&queue->changed, NULL);
+	queue->last = &queue->first;
+	queue->limit = limit;
+	return queue;
+}
+
+void render_queue_destroy(struct render_queue *queue)
+{
+	if (!queue)
+		return;
+	pthread_cond_destroy(&queue->changed);
+	pthread_mutex_destroy(&queue->mutex);
+	free(queue);
+}
+
+bool render_queue_push(struct render_queue *queue, struct render_job *job)
+{
+	pthread_mutex_lock(&queue->mutex);
+	bool accepted = !queue->closed && queue->depth < queue->limit;
+	if (accepted) {
+		job->queued_ms = clock_now_ms();
+		job->next = NULL;
+		*queue->last = job;
+		queue->last = &job->next;
+		queue->depth++;
+		pthread_cond_signal(&queue->changed);
+	}
+	pthread_mutex_unlock(&queue->mutex);
+	return accepted;
+}
+
+struct render_job *render_queue_pop(struct render_queue *queue)
+{
+	pthread_mutex_lock(&queue->mutex);
+	while (!queue->first && !queue->closed)
+		pthread_cond_wait(&queue->changed, &queue->mutex);
+	struct render_job *job = queue->first;
+	if (job) {
+		queue->first = job->next;
+		if (!queue->first)
+			queue->last = &queue->first;
+		queue->depth--;
+	}
+	pthread_mutex_unlock(&queue->mutex);
+	return job;
+}
+
+void render_queue_close(struct render_queue *queue)
+{
+	pthread_mutex_lock(&queue->mutex);
+	queue->closed = true;
+	pthread_cond_broadcast(&queue->changed);
+	pthread_mutex_unlock(&queue->mutex);
+}
+
+size_t render_queue_depth(struct render_queue *queue)
+{
+	pthread_mutex_lock(&queue->mutex);
+	size_t depth = queue->depth;
+	pthread_mutex_unlock(&queue->mutex);
+	return depth;
+}

@@ -1,0 +1,52 @@
+/* Bounded queue of render jobs, from the HTTP threads to the render thread. Any thread.
+ *
+ * A full queue refuses: overload is an answer (503), not a wait. Jobs leave in the order they came. Once closed the queue takes nothing
+ * more, and still gives out what it holds.
+ */
+#ifndef STRATUS_SERVER_RENDER_QUEUE_H
+#define STRATUS_SERVER_RENDER_QUEUE_H
+
+#include "renderer/renderer.h"
+
+enum render_outcome {
+	RENDER_OUTCOME_OK,      /* job->frame is set and belongs to the job's owner */
+	RENDER_OUTCOME_EXPIRED, /* the deadline passed, in the queue or between passes */
+	RENDER_OUTCOME_ABANDONED /* nobody waits for it any more */,
+	RENDER_OUTCOME_FAILED
+};
+
+/* One picture to render. Belongs to its maker, who keeps it until `finished` was called. */
+struct render_job {
+	const struct scene *scene;
+	double deadline_ms; /* on the clock of clock.h */
+	double queued_ms;   /* likewise, set by render_queue_push */
+
+	/* Asked by the render thread at dequeue and between passes: does nobody wait any more? */
+	bool (*abandoned)(struct render_job *job);
+	/* Called once by the render thread, with the outcome set; the job may be gone when it returns. */
+	void (*finished)(struct render_job *job);
+
+	enum render_outcome outcome;
+	double waited_ms; /* in the queue */
+	struct frame frame;
+	struct render_job *next; /* of the queue */
+};
+
+struct render_queue;
+
+/* limit: jobs waiting at most, from 1. NULL when out of memory. */
+struct render_queue *render_queue_create(size_t limit);
+void render_queue_destroy(struct render_queue *queue);
+
+/* false when full or closed; the job then stays with the caller. */
+bool render_queue_push(struct render_queue *queue, struct render_job *job);
+
+/* Waits for a job. NULL once the queue is closed and empty. */
+struct render_job *render_queue_pop(struct render_queue *queue);
+
+void render_queue_close(struct render_queue *queue);
+
+/* Jobs waiting now. */
+size_t render_queue_depth(struct render_queue *queue);
+
+#endif

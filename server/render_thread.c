@@ -1,0 +1,153 @@
+#include "server/render_thread.h"
+
+#include "renderer/log.h"
+#include "server/clock.h"
+#include "server/kernel_file.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+/* So many failures on end are taken for a dead context rather than for bad luck. */
+enum { FAILURES_MAX = 3 };
+
+struct render_thread {
+	const struct config *config;
+	struct render_queue *queue;
+	pthread_t thread;
+	struct kernel *kernel;
+	struct renderer *renderer;
+	_Atomic int state; /* enum render_thread_state; kernel and renderer are set before it says READY */
+	_Atomic double busy_since_ms, typical_ms;
+	int failures; /* on end */
+};
+
+static bool is_expired(const struct render_job *job)
+{
+	return clock_now_ms() >= job->deadline_ms;
+}
+
+static bool is_cancelled(void *context)
+{
+	struct render_job *job = context;
+	return is_expired(job) || job->abandoned(job);
+}
+
+static enum render_outcome render(struct render_thread *thread, struct render_job *job)
+{
+	if (is_expired(job))
+		return RENDER_OUTCOME_EXPIRED;
+	if (job->abandoned(job))
+		return RENDER_OUTCOME_ABANDONED;
+	enum render_result result = renderer_render(thread->renderer, job->scene, is_cancelled, job, &job->frame);
+	if (result == RENDER_CANCELLED)
+		return is_expired(job) ? RENDER_OUTCOME_EXPIRED : RENDER_OUTCOME_ABANDONED;
+	thread->failures = result == RENDER_OK ? 0 : thread->failures + 1;
+	if (thread->failures >= FAILURES_MAX)
+		thread->state = RENDER_THREAD_FAILED;
+	else if (result == RENDER_OK)
+		thread->state = RENDER_THREAD_READY;
+	return result == RENDER_OK ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
+}
+
+static void run_jobs(struct render_thread *thread)
+{
+	for (struct render_job *job; (job = render_queue_pop(thread->queue));) {
+		double start = clock_now_ms();
+		thread->busy_since_ms = start;
+		job->waited_ms = start - job->queued_ms;
+		job->outcome = render(thread, job);
+		double took = clock_now_ms() - start;
+		if (job->outcome == RENDER_OUTCOME_OK)
+			thread->typical_ms = thread->typical_ms > 0 ? 0.7 * thread->typical_ms + 0.3 * took : took;
+		thread->busy_since_ms = 0;
+		job->finished(job);
+	}
+}
+
+static bool start(struct render_thread *thread)
+{
+	const struct config *config = thread->config;
+	thread->kernel = kernel_file_open(config->kernel, config->state_dir);
+	if (!thread->kernel)
+		return false;
+	const struct renderer_params params = {
+		.device_index = config->device,
+		.require_gpu = config->require_gpu,
+		.pass_kind = (enum pass_kind)config->pass_kind,
+		.shader_dir = config->shader_dir,
+		.kernel = thread->kernel,
+		.cache_bytes = (size_t)config->cache_mb << 20,
+	};
+	thread->renderer = renderer_create(&params);
+	return thread->renderer != NULL;
+}
+
+static void *thread_main(void *context)
+{
+	struct render_thread *thread = context;
+	double begin = clock_now_ms();
+	if (start(thread)) {
+		const struct renderer_info *info = renderer_info(thread->renderer);
+		log_info("renderer up in %.0f ms: %s, %s, OpenGL %s%s", clock_now_ms() - begin, info->vendor, info->renderer, info->version,
+			 info->software ? " (software rendering)" : "");
+		thread->state = RENDER_THREAD_READY;
+		run_jobs(thread);
+	} else {
+		thread->state = RENDER_THREAD_FAILED;
+	}
+	renderer_destroy(thread->renderer);
+	return NULL;
+}
+
+struct render_thread *render_thread_create(const struct config *config, struct render_queue *queue)
+{
+	struct render_thread *thread = calloc(1, sizeof *thread);
+	if (!thread) {
+		log_error("render_thread_create: out of memory");
+		return NULL;
+	}
+	thread->config = config;
+	thread->queue = queue;
+	if (pthread_create(&thread->thread, NULL, thread_main, thread) != 0) {
+		log_error("render_thread_create: pthread_create failed");
+		free(thread);
+		return NULL;
+	}
+	return thread;
+}
+
+void render_thread_destroy(struct render_thread *thread)
+{
+	if (!thread)
+		return;
+	pthread_join(thread->thread, NULL);
+	kernel_destroy(thread->kernel);
+	free(thread);
+}
+
+enum render_thread_state render_thread_state(const struct render_thread *thread)
+{
+	return (enum render_thread_state)thread->state;
+}
+
+const struct renderer_info *render_thread_info(const struct render_thread *thread)
+{
+	return renderer_info(thread->renderer);
+}
+
+const struct kernel *render_thread_kernel(const struct render_thread *thread)
+{
+	return thread->kernel;
+}
+
+double render_thread_busy_ms(const struct render_thread *thread)
+{
+	double since = thread->busy_since_ms;
+	return since > 0 ? clock_now_ms() - since : 0;
+}
+
+double render_thread_typical_ms(const struct render_thread *thread)
+{
+	return thread->typical_ms;
+}

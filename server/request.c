@@ -1,0 +1,100 @@
+#include "server/request.h"
+
+#include "server/clock.h"
+#include "server/service.h"
+
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+/* The path of an absolute target ("http://host/path", sent to proxies), or the target itself. */
+static const char *origin_form(const char *target)
+{
+	static const char scheme[] = "http://";
+	if (strncmp(target, scheme, sizeof scheme - 1) != 0)
+		return target;
+	const char *path = strchr(target + sizeof scheme - 1, '/');
+	return path ? path : "/";
+}
+
+struct request *request_create(struct service *service, const char *target)
+{
+	struct request *request = calloc(1, sizeof *request);
+	if (!request)
+		return NULL;
+	request->service = service;
+	request->started_ms = clock_now_ms();
+	request->path = strdup(origin_form(target));
+	if (!request->path) {
+		free(request);
+		return NULL;
+	}
+	char *query = strchr(request->path, '?');
+	if (query) {
+		*query = '\0';
+		request->query = query + 1;
+	}
+	return request;
+}
+
+void request_destroy(struct request *request)
+{
+	if (!request)
+		return;
+	if (request->work)
+		request->work_destroy(request->work);
+	problem_finish(&request->problem);
+	text_finish(&request->body);
+	free(request->path);
+	free(request);
+}
+
+const char *request_header(const struct request *request, const char *name)
+{
+	return MHD_lookup_connection_value(request->connection, MHD_HEADER_KIND, name);
+}
+
+/* Characters that need no escape in a URI, a header, JSON or a log line. */
+static bool is_plain(const char *id)
+{
+	static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~:@/+=";
+	size_t length = strspn(id, plain);
+	return length > 0 && length < REQUEST_ID_SIZE && id[length] == '\0';
+}
+
+void request_identify(struct request *request)
+{
+	const char *sent = request_header(request, "X-Request-Id");
+	if (sent && is_plain(sent)) {
+		strcpy(request->id, sent);
+		return;
+	}
+	unsigned char random[16] = {0};
+	if (getrandom(random, sizeof random, 0) < 0)
+		memcpy(random, &request->started_ms, sizeof request->started_ms);
+	for (size_t i = 0; i < sizeof random; i++)
+		snprintf(request->id + 2 * i, 3, "%02x", random[i]);
+}
+
+void request_suspend(struct request *request, request_handler *next)
+{
+	request->next = next;
+	request->service->suspended++;
+	MHD_suspend_connection(request->connection);
+}
+
+void request_resume(struct request *request)
+{
+	struct service *service = request->service;
+	MHD_resume_connection(request->connection);
+	service->suspended--;
+}
+
+bool request_is_abandoned(const struct request *request)
+{
+	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+	struct pollfd poll_fd = {.fd = info ? info->connect_fd : -1, .events = POLLRDHUP};
+	return poll(&poll_fd, 1, 0) > 0 && (poll_fd.revents & (POLLRDHUP | POLLHUP | POLLERR));
+}

@@ -1,0 +1,71 @@
+/* One HTTP request, from its first line to the last byte of its answer.
+ *
+ * Made when libmicrohttpd has read the request line, freed in its completion callback and nowhere else. While the request is suspended it
+ * belongs to whoever works for it, and to the HTTP thread otherwise; the hand-over is request_resume, after which the worker must not touch
+ * it.
+ */
+#ifndef STRATUS_SERVER_REQUEST_H
+#define STRATUS_SERVER_REQUEST_H
+
+#include "server/metrics.h"
+#include "server/problem.h"
+#include "server/text.h"
+
+#include <jansson.h>
+#include <microhttpd.h>
+
+enum { REQUEST_ID_SIZE = 129, REQUEST_BODY_MAX = 1 << 20 };
+
+struct request;
+struct service;
+
+/* Answers (or suspends) a request. MHD_NO closes the connection without an answer. */
+typedef enum MHD_Result request_handler(struct request *request);
+
+struct route {
+	const char *path;
+	const char *allow; /* methods, as the Allow header says them */
+	request_handler *handler;
+	enum metrics_route metrics;
+};
+
+struct request {
+	struct service *service;
+	struct MHD_Connection *connection; /* NULL until the headers are in */
+	char *path;                        /* as sent, without the query */
+	const char *query;                 /* as sent, behind the question mark; NULL: none */
+	const char *method;                /* libmicrohttpd's, valid during its callbacks */
+	bool is_post, is_head;
+	double started_ms;
+	char id[REQUEST_ID_SIZE];
+	const struct route *route;
+	request_handler *next; /* what libmicrohttpd's next call runs */
+	struct text body;
+	struct problem problem;
+	struct timings timings;
+	unsigned status; /* answered; 0: not yet */
+
+	/* What a route keeps with the request. */
+	void *work;
+	void (*work_destroy)(void *work);
+};
+
+/* target: of the request line. NULL when out of memory. */
+struct request *request_create(struct service *service, const char *target);
+void request_destroy(struct request *request);
+
+/* A request header, NULL when not sent. HTTP thread. */
+const char *request_header(const struct request *request, const char *name);
+
+/* Takes X-Request-Id over when it is short and plain, else makes one up. HTTP thread. */
+void request_identify(struct request *request);
+
+/* HTTP thread: no more calls for this request until request_resume; then `next` runs. */
+void request_suspend(struct request *request, request_handler *next);
+/* Any thread, once. */
+void request_resume(struct request *request);
+
+/* Has the client closed its end? Any thread while suspended (the connection stays open as long). */
+bool request_is_abandoned(const struct request *request);
+
+#endif

@@ -1,0 +1,137 @@
+#include "server/response.h"
+
+#include "renderer/log.h"
+#include "server/clock.h"
+#include "server/entity_tag.h"
+#include "server/service.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+
+struct MHD_Response *response_create(char *data, size_t size)
+{
+	struct MHD_Response *response = data ? MHD_create_response_from_buffer_with_free_callback(size, data, free) : NULL;
+	if (!response) {
+		log_error("response_create: out of memory");
+		free(data);
+	}
+	return response;
+}
+
+void response_set(struct MHD_Response *response, const char *name, const char *value)
+{
+	if (response && MHD_add_response_header(response, name, value) != MHD_YES)
+		log_error("response header %s could not be set", name);
+}
+
+enum MHD_Result response_send(struct request *request, unsigned status, struct MHD_Response *response)
+{
+	if (!response)
+		return MHD_NO;
+	char timing[SERVER_TIMING_SIZE];
+	timings_set(&request->timings, TIMING_TOTAL, clock_now_ms() - request->started_ms);
+	timings_format(&request->timings, timing);
+	response_set(response, "Server-Timing", timing);
+	response_set(response, "Timing-Allow-Origin", "*");
+	response_set(response, "X-Request-Id", request->id);
+	enum MHD_Result result = MHD_queue_response(request->connection, status, response);
+	MHD_destroy_response(response);
+	if (result == MHD_YES)
+		request->status = status;
+	return result;
+}
+
+/* Seconds after which trying again makes sense; 0: it makes none. */
+static unsigned retry_after(const struct request *request)
+{
+	switch (request->problem.kind) {
+	case PROBLEM_QUEUE_FULL:
+		return service_retry_seconds(request->service);
+	case PROBLEM_STARTING:
+		return 2;
+	case PROBLEM_SHUTTING_DOWN:
+		return 5;
+	default:
+		return 0;
+	}
+}
+
+enum MHD_Result response_send_problem(struct request *request)
+{
+	unsigned retry = retry_after(request);
+	char *text = problem_to_json(&request->problem, request->id, retry);
+	struct MHD_Response *response = response_create(text, text ? strlen(text) : 0);
+	response_set(response, "Content-Type", "application/problem+json");
+	response_set(response, "Cache-Control", CACHE_NONE);
+	if (retry) {
+		char seconds[16];
+		snprintf(seconds, sizeof seconds, "%u", retry);
+		response_set(response, "Retry-After", seconds);
+	}
+	if (request->problem.kind == PROBLEM_METHOD)
+		response_set(response, "Allow", request->route->allow);
+	return response_send(request, problem_status(request->problem.kind), response);
+}
+
+enum MHD_Result response_send_new_problem(struct request *request, enum problem_kind kind, const char *format, ...)
+{
+	char detail[PROBLEM_DETAIL_SIZE];
+	va_list args;
+	va_start(args, format);
+	vsnprintf(detail, sizeof detail, format, args);
+	va_end(args);
+	problem_finish(&request->problem);
+	problem_set(&request->problem, kind, "%s", detail);
+	return response_send_problem(request);
+}
+
+enum MHD_Result response_send_document(struct request *request, char *text, const char *content_type, const char *cache_control)
+{
+	char tag[ENTITY_TAG_SIZE];
+	if (!text)
+		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
+	size_t size = strlen(text);
+	entity_tag_of(text, size, tag);
+	bool known = entity_tag_matches(request_header(request, "If-None-Match"), tag);
+	struct MHD_Response *response = response_create(text, known ? 0 : size);
+	if (!known)
+		response_set(response, "Content-Type", content_type);
+	response_set(response, "ETag", tag);
+	response_set(response, "Cache-Control", cache_control);
+	return response_send(request, known ? MHD_HTTP_NOT_MODIFIED : MHD_HTTP_OK, response);
+}
+
+enum MHD_Result response_send_json(struct request *request, unsigned status, json_t *root, const char *cache_control)
+{
+	char *text = root ? json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9)) : NULL;
+	json_decref(root);
+	if (status == MHD_HTTP_OK && strcmp(cache_control, CACHE_NONE) != 0)
+		return response_send_document(request, text, "application/json", cache_control);
+	struct MHD_Response *response = response_create(text, text ? strlen(text) : 0);
+	response_set(response, "Content-Type", "application/json");
+	response_set(response, "Cache-Control", cache_control);
+	return response_send(request, status, response);
+}
+
+enum MHD_Result response_refuse_body(struct request *request)
+{
+	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+	struct text answer = {0};
+	problem_set(&request->problem, PROBLEM_TOO_LARGE, "A body has at most %d bytes.", REQUEST_BODY_MAX);
+	char *body = problem_to_json(&request->problem, request->id, 0);
+	if (body && info) {
+		text_printf(&answer,
+			    "HTTP/1.1 413 Content Too Large\r\nContent-Type: application/problem+json\r\nContent-Length: %zu\r\n"
+			    "Cache-Control: " CACHE_NONE "\r\nX-Request-Id: %s\r\nConnection: close\r\n\r\n%s",
+			    strlen(body), request->id, body);
+		/* The answer is far smaller than a socket's buffer; a client that reads nothing gets nothing. */
+		if (!answer.failed && send(info->connect_fd, answer.data, answer.length, MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
+			request->status = problem_status(PROBLEM_TOO_LARGE);
+	}
+	free(body);
+	text_finish(&answer);
+	return MHD_NO;
+}

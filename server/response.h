@@ -1,0 +1,32 @@
+/* Answers: the headers every one carries, problems, documents. HTTP thread. */
+#ifndef STRATUS_SERVER_RESPONSE_H
+#define STRATUS_SERVER_RESPONSE_H
+
+#include "server/request.h"
+
+/* Cache-Control of what a scene or a query determines: kept, and asked for again by its entity tag after an hour. */
+#define CACHE_KEEP "public, max-age=3600"
+#define CACHE_NONE "no-store"
+
+/* Takes over malloc'd data (also on failure). NULL when out of memory. */
+struct MHD_Response *response_create(char *data, size_t size);
+void response_set(struct MHD_Response *response, const char *name, const char *value);
+
+/* Sends with the headers every answer has; the response is given up in any case. NULL answers nothing. */
+enum MHD_Result response_send(struct request *request, unsigned status, struct MHD_Response *response);
+
+/* Sends request->problem, or the one stated here. */
+enum MHD_Result response_send_problem(struct request *request);
+__attribute__((format(printf, 3, 4))) enum MHD_Result response_send_new_problem(struct request *request, enum problem_kind kind,
+										const char *format, ...);
+
+/* Sends a text with an entity tag of its content, or 304 when the client has it. `text` is taken over; NULL: out of memory. */
+enum MHD_Result response_send_document(struct request *request, char *text, const char *content_type, const char *cache_control);
+/* Likewise JSON; root is taken over. */
+enum MHD_Result response_send_json(struct request *request, unsigned status, json_t *root, const char *cache_control);
+
+/* 413 while a body is still coming in. libmicrohttpd takes no response then, so the answer is written to the socket; the connection
+ * closes. */
+enum MHD_Result response_refuse_body(struct request *request);
+
+#endif

@@ -1,0 +1,181 @@
+/* /v1/optics: the optical properties of a droplet size distribution, and the paper's fit of the slab.
+ *
+ * Computed by a worker: it takes some milliseconds, and HTTP threads do not compute.
+ */
+#include "server/routes.h"
+
+#include "renderer/optics/optics.h"
+#include "renderer/optics/paper_slab.h"
+#include "server/clock.h"
+#include "server/number_text.h"
+#include "server/query.h"
+#include "server/response.h"
+#include "server/scene_query.h"
+#include "server/scene_rules.h"
+#include "server/service.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct optics_work {
+	struct work work;
+	struct request *request;
+	struct scene_input input;
+	double sun_zenith_deg;
+	bool zenith_given, refused;
+	json_t *answer;
+	double computed_ms;
+};
+
+static void work_destroy(void *context)
+{
+	struct optics_work *work = context;
+	json_decref(work->answer);
+	free(work);
+}
+
+static bool is_wanted(const struct scene_field *field)
+{
+	return strcmp(field->section, "dsd") == 0 || strcmp(field->section, "sun") == 0 ||
+	       (strcmp(field->section, "model") == 0 && strcmp(field->name, "optics") == 0);
+}
+
+static void read_zenith(const char *value, struct optics_work *work, struct problem *problem)
+{
+	if (work->zenith_given)
+		problem_add(problem, "/sun_zenith_deg", "is given twice");
+	else if (!number_parse(value, &work->sun_zenith_deg))
+		problem_add(problem, "/sun_zenith_deg", "must be a number");
+	else if (!(work->sun_zenith_deg >= 0 && work->sun_zenith_deg <= 90))
+		problem_add(problem, "/sun_zenith_deg", "must be from 0 to 90");
+	work->zenith_given = true;
+}
+
+/* Takes sun_zenith_deg, which is no member of a scene, out of the query. */
+static void take_zenith(struct query *query, struct optics_work *work, struct problem *problem)
+{
+	size_t kept = 0;
+	for (size_t i = 0; i < query->count; i++) {
+		if (strcmp(query->pairs[i].name, "sun_zenith_deg") == 0)
+			read_zenith(query->pairs[i].value, work, problem);
+		else
+			query->pairs[kept++] = query->pairs[i];
+	}
+	query->count = kept;
+}
+
+static bool sun_given(const struct scene_input *input)
+{
+	for (const struct scene_field *field = scene_fields; field->section; field++)
+		if (strcmp(field->section, "sun") == 0 && scene_field_given(input, field))
+			return true;
+	return false;
+}
+
+static void read_parameters(struct request *request, struct optics_work *work)
+{
+	struct problem *problem = &request->problem;
+	struct query query;
+	work->input = scene_input_default();
+	if (query_parse(request->query, &query, problem)) {
+		take_zenith(&query, work, problem);
+		scene_query_read(&query, is_wanted, &work->input, problem);
+		scene_rules_apply(&work->input, problem);
+		if (work->zenith_given && sun_given(&work->input))
+			problem_add(problem, "/sun_zenith_deg", "does not go with the sun's position: give one form");
+	}
+	query_finish(&query);
+	if (work->zenith_given || problem->kind != PROBLEM_NONE)
+		return;
+	work->sun_zenith_deg = 90 - work->input.scene.sun.elevation_deg;
+	if (work->sun_zenith_deg > 90)
+		problem_add(problem, "/sun", "is below the horizon, where the fit has no row");
+}
+
+static json_t *numbers_to_json(const double *numbers, int count)
+{
+	json_t *array = json_array();
+	for (int i = 0; i < count; i++)
+		json_array_append_new(array, json_real(numbers[i]));
+	return array;
+}
+
+static json_t *phase_to_json(const struct optics *optics)
+{
+	json_t *angles = json_array(), *values = json_array();
+	for (int i = 0; i < optics->angle_count; i++)
+		json_array_append_new(angles, json_real(optics->angle[i] * 180 / M_PI));
+	for (int band = 0; band < BAND_COUNT; band++)
+		json_array_append_new(values, numbers_to_json(optics->phase[band], optics->angle_count));
+	return json_pack("{s:o, s:o}", "angle_deg", angles, "value", values);
+}
+
+static json_t *fit_to_json(double sun_zenith_deg)
+{
+	const struct paper_fit fit = paper_fit_at(sun_zenith_deg * M_PI / 180);
+	return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "beta", fit.beta, "sun_zenith_deg", sun_zenith_deg, "b", fit.b, "c", fit.c,
+			 "kappa_c", fit.kappa_c, "t", fit.t, "r", fit.r);
+}
+
+static json_t *optics_to_json(const struct optics *optics, double sun_zenith_deg)
+{
+	return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "wavelength_nm", numbers_to_json(band_wavelength_nm, BAND_COUNT),
+			 "extinction_per_m", numbers_to_json(optics->extinction_per_m, BAND_COUNT), "asymmetry",
+			 numbers_to_json(optics->asymmetry, BAND_COUNT), "single_scattering_albedo",
+			 numbers_to_json(optics->single_scattering_albedo, BAND_COUNT), "forward_peak_fraction",
+			 numbers_to_json(optics->forward_peak_fraction, BAND_COUNT), "phase_function", phase_to_json(optics), "paper_fit",
+			 fit_to_json(sun_zenith_deg));
+}
+
+static void compute(struct work *base)
+{
+	struct optics_work *work = (struct optics_work *)((char *)base - offsetof(struct optics_work, work));
+	const struct scene *scene = &work->input.scene;
+	double start = clock_now_ms();
+	struct optics *optics =
+		optics_create(render_thread_kernel(work->request->service->render_thread), &scene->dsd, scene->model.optics);
+	if (optics)
+		work->answer = optics_to_json(optics, work->sun_zenith_deg);
+	optics_destroy(optics);
+	work->computed_ms = clock_now_ms() - start;
+	request_resume(work->request);
+}
+
+static enum MHD_Result finish(struct request *request)
+{
+	struct optics_work *work = request->work;
+	if (work->refused) {
+		metrics_count_rejection(request->service->metrics, REJECTED_FULL);
+		return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "The workers are busy.");
+	}
+	if (!work->answer)
+		return response_send_new_problem(request, PROBLEM_INTERNAL,
+						 "The optics could not be computed. The log has the reason under %s.", request->id);
+	timings_set(&request->timings, TIMING_OPTICS, work->computed_ms);
+	json_t *answer = work->answer;
+	work->answer = NULL;
+	return response_send_json(request, MHD_HTTP_OK, answer, CACHE_KEEP);
+}
+
+enum MHD_Result route_optics(struct request *request)
+{
+	struct optics_work *work = calloc(1, sizeof *work);
+	if (!work)
+		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
+	work->request = request;
+	work->work.run = compute;
+	request->work = work;
+	request->work_destroy = work_destroy;
+	read_parameters(request, work);
+	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
+		return response_send_problem(request);
+	/* Suspended first: a worker may be done before worker_pool_try returns. */
+	request_suspend(request, finish);
+	if (!worker_pool_try(request->service->workers, &work->work)) {
+		work->refused = true;
+		request_resume(request);
+	}
+	return MHD_YES;
+}

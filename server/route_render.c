@@ -1,0 +1,266 @@
+/* /v1/render: a scene in, an image out.
+ *
+ * The HTTP thread reads and checks the scene and answers what needs no rendering; then the request is suspended and goes from the queue to
+ * the render thread, from there to a worker that encodes, and back to the HTTP thread with its image.
+ */
+#include "server/routes.h"
+
+#include "renderer/log.h"
+#include "server/clock.h"
+#include "server/entity_tag.h"
+#include "server/json_document.h"
+#include "server/negotiation.h"
+#include "server/query.h"
+#include "server/response.h"
+#include "server/scene_canonical.h"
+#include "server/scene_json.h"
+#include "server/scene_query.h"
+#include "server/scene_rules.h"
+#include "server/service.h"
+
+#include <errno.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { TIMEOUT_MS_MAX = 3600000 };
+
+struct render_work {
+	struct render_job job; /* for the render thread */
+	struct work encode;    /* for the worker */
+	struct request *request;
+	struct scene_input input;
+	char *canonical, *location;
+	char key[DIGEST_SIZE], tag[ENTITY_TAG_SIZE];
+	bool refused; /* the queue was full */
+	struct image_buffer image;
+	double encode_ms;
+};
+
+static void work_destroy(void *context)
+{
+	struct render_work *work = context;
+	frame_finish(&work->job.frame);
+	free(work->image.data);
+	free(work->canonical);
+	free(work->location);
+	free(work);
+}
+
+/* --- reading, on the HTTP thread ------------------------------------------------------------------------------------------- */
+
+static void read_body(struct request *request, struct scene_input *input)
+{
+	text_append(&request->body, "", 0);
+	if (request->body.failed) {
+		problem_set(&request->problem, PROBLEM_INTERNAL, "Out of memory.");
+		return;
+	}
+	json_t *root = json_document_parse(request->body.data, request->body.length, &request->problem);
+	if (root)
+		scene_json_read(root, input, &request->problem);
+	json_decref(root);
+}
+
+static void read_query(struct request *request, struct scene_input *input)
+{
+	struct query query;
+	if (query_parse(request->query, &query, &request->problem))
+		scene_query_read(&query, NULL, input, &request->problem);
+	query_finish(&query);
+}
+
+/* Fills request->problem when there is no such picture to be had. */
+static void read_scene(struct request *request, struct scene_input *input)
+{
+	*input = scene_input_default();
+	if (request->is_post)
+		read_body(request, input);
+	else
+		read_query(request, input);
+	if (request->problem.kind != PROBLEM_NONE && request->problem.kind != PROBLEM_INVALID)
+		return;
+	enum image_format *format = &input->scene.output.format;
+	bool acceptable = negotiation_choose(request_header(request, "Accept"), *format, format);
+	scene_rules_apply(input, &request->problem);
+	if (!acceptable)
+		problem_set(&request->problem, PROBLEM_NOT_ACCEPTABLE, "The image would be %s, which the Accept header excludes.",
+			    image_content_types[*format]);
+}
+
+/* X-Timeout-Ms, or the configured default; 0 and a problem when it is no such number. */
+static int read_timeout(struct request *request)
+{
+	const char *text = request_header(request, "X-Timeout-Ms");
+	if (!text)
+		return request->service->config->timeout_ms;
+	char *end;
+	errno = 0;
+	long milliseconds = strtol(text, &end, 10);
+	if (errno == 0 && end != text && *end == '\0' && milliseconds >= 1 && milliseconds <= TIMEOUT_MS_MAX)
+		return (int)milliseconds;
+	problem_set(&request->problem, PROBLEM_BAD_REQUEST, "X-Timeout-Ms must be a whole number from 1 to %d.", TIMEOUT_MS_MAX);
+	return 0;
+}
+
+/* What follows from the scene alone. false when out of memory. */
+static bool describe(struct render_work *work, const struct service *service)
+{
+	struct text tagged = {0}, location = {0};
+	char *query = scene_canonical_query(&work->input.scene);
+	work->canonical = scene_canonical(&work->input.scene);
+	scene_canonical_key(&work->input.scene, work->key);
+	text_add(&location, "/v1/render");
+	text_printf(&location, "%s%s", query && *query ? "?" : "", query ? query : "");
+	work->location = text_take(&location);
+	text_printf(&tagged, "%s|%s", work->canonical ? work->canonical : "", service->pixel_version);
+	bool good = query && work->canonical && work->location && !tagged.failed;
+	if (good)
+		entity_tag_of(tagged.data, tagged.length, work->tag);
+	free(query);
+	text_finish(&tagged);
+	return good;
+}
+
+/* --- answering, on the HTTP thread ------------------------------------------------------------------------------------------ */
+
+static enum MHD_Result send_image(struct request *request, unsigned status, struct MHD_Response *response)
+{
+	const struct render_work *work = request->work;
+	if (status == MHD_HTTP_OK)
+		response_set(response, "Content-Type", image_content_types[work->input.scene.output.format]);
+	response_set(response, "ETag", work->tag);
+	response_set(response, "Vary", "Accept");
+	response_set(response, "Cache-Control", CACHE_KEEP);
+	response_set(response, "X-Scene-Key", work->key);
+	response_set(response, "Content-Location", work->location);
+	return response_send(request, status, response);
+}
+
+/* A HEAD is answered without rendering, so its length is unknown. */
+static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size_t size)
+{
+	(void)context, (void)position, (void)buffer, (void)size;
+	return MHD_CONTENT_READER_END_OF_STREAM;
+}
+
+static enum MHD_Result send_head(struct request *request)
+{
+	return send_image(request, MHD_HTTP_OK, MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1024, read_nothing, NULL, NULL));
+}
+
+static enum MHD_Result finish(struct request *request)
+{
+	struct render_work *work = request->work;
+	struct metrics *metrics = request->service->metrics;
+	if (work->refused) {
+		if (request->service->stopping)
+			return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
+		metrics_count_rejection(metrics, REJECTED_FULL);
+		return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "%d renders are waiting, and no more may.",
+						 request->service->config->queue_length);
+	}
+	timings_set(&request->timings, TIMING_QUEUE, work->job.waited_ms);
+	switch (work->job.outcome) {
+	case RENDER_OUTCOME_EXPIRED:
+		metrics_count_end(metrics, ENDED_EXPIRED);
+		return response_send_new_problem(request, PROBLEM_DEADLINE, "The image was not ready within its deadline.");
+	case RENDER_OUTCOME_ABANDONED:
+		metrics_count_end(metrics, ENDED_ABANDONED);
+		return MHD_NO;
+	case RENDER_OUTCOME_FAILED:
+		metrics_count_end(metrics, ENDED_FAILED);
+		return response_send_new_problem(request, PROBLEM_RENDER_FAILED,
+						 "The image could not be made. The log has the reason under %s.", request->id);
+	case RENDER_OUTCOME_OK:
+		break;
+	}
+	timings_set_frame(&request->timings, &work->job.frame);
+	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
+	struct MHD_Response *response = response_create((char *)work->image.data, work->image.size);
+	work->image.data = NULL;
+	enum MHD_Result result = send_image(request, MHD_HTTP_OK, response);
+	metrics_count_timings(metrics, &request->timings);
+	return result;
+}
+
+/* --- on other threads --------------------------------------------------------------------------------------------------------- */
+
+static bool is_abandoned(struct render_job *job)
+{
+	const struct render_work *work = (const struct render_work *)((char *)job - offsetof(struct render_work, job));
+	return work->request->service->giving_up || request_is_abandoned(work->request);
+}
+
+static void encode(struct work *base)
+{
+	struct render_work *work = (struct render_work *)((char *)base - offsetof(struct render_work, encode));
+	const struct image_metadata metadata = {
+		.scene_json = work->canonical, .request_id = work->request->id, .software = "stratus " RENDERER_VERSION};
+	char error[256] = "";
+	double start = clock_now_ms();
+	if (start >= work->job.deadline_ms) {
+		work->job.outcome = RENDER_OUTCOME_EXPIRED;
+	} else if (!work->request->service->images->encode(&work->job.frame, &work->input.scene, &metadata, &work->image, error,
+							   sizeof error)) {
+		log_error("request %s: encoding failed: %s", work->request->id, error);
+		work->job.outcome = RENDER_OUTCOME_FAILED;
+	}
+	work->encode_ms = clock_now_ms() - start;
+	free(work->job.frame.pixels);
+	work->job.frame.pixels = NULL;
+	request_resume(work->request);
+}
+
+static void on_rendered(struct render_job *job)
+{
+	struct render_work *work = (struct render_work *)((char *)job - offsetof(struct render_work, job));
+	if (job->outcome == RENDER_OUTCOME_FAILED)
+		log_error("request %s: rendering failed", work->request->id);
+	if (job->outcome == RENDER_OUTCOME_OK)
+		worker_pool_wait(work->request->service->workers, &work->encode);
+	else
+		request_resume(work->request);
+}
+
+/* --- the way through ------------------------------------------------------------------------------------------------------------ */
+
+static enum MHD_Result enqueue(struct request *request, int timeout_ms)
+{
+	struct render_work *work = request->work;
+	struct render_queue *queue = request->service->queue;
+	work->job.scene = &work->input.scene;
+	work->job.deadline_ms = request->started_ms + timeout_ms;
+	work->job.abandoned = is_abandoned;
+	work->job.finished = on_rendered;
+	work->encode.run = encode;
+	/* Suspended first: the render thread may be done before render_queue_push returns. */
+	request_suspend(request, finish);
+	if (!render_queue_push(queue, &work->job)) {
+		work->refused = true;
+		request_resume(request);
+	}
+	return MHD_YES;
+}
+
+enum MHD_Result route_render(struct request *request)
+{
+	struct render_work *work = calloc(1, sizeof *work);
+	if (!work)
+		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
+	work->request = request;
+	request->work = work;
+	request->work_destroy = work_destroy;
+
+	read_scene(request, &work->input);
+	int timeout_ms = read_timeout(request);
+	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
+		return response_send_problem(request);
+	if (!describe(work, request->service))
+		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
+	if (!request->is_post && entity_tag_matches(request_header(request, "If-None-Match"), work->tag))
+		return send_image(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
+	if (request->is_head)
+		return send_head(request);
+	return enqueue(request, timeout_ms);
+}

@@ -1,0 +1,35 @@
+#include "server/routes.h"
+
+#include <string.h>
+
+static const struct route routes[] = {
+	{"/v1/render", "GET, HEAD, POST", route_render, ROUTE_RENDER},
+	{"/v1/optics", "GET, HEAD", route_optics, ROUTE_OPTICS},
+	{"/v1/sun", "GET, HEAD", route_sun, ROUTE_SUN},
+	{"/v1/presets", "GET, HEAD", route_presets, ROUTE_PRESETS},
+	{"/", "GET, HEAD", route_index, ROUTE_INDEX},
+	{"/openapi.yaml", "GET, HEAD", route_openapi, ROUTE_OPENAPI},
+	{"/healthz", "GET, HEAD", route_healthz, ROUTE_HEALTHZ},
+	{"/readyz", "GET, HEAD", route_readyz, ROUTE_READYZ},
+	{"/metrics", "GET, HEAD", route_metrics, ROUTE_METRICS},
+};
+
+/* Known calls of later releases, with everything below them. */
+static const char *const later_paths[] = {"/v1/slab", "/v1/sky", "/v1/assets"};
+
+/* Without `allow`: every method is as wrong as the path. */
+static const struct route later = {"later", NULL, route_later, ROUTE_OTHER};
+static const struct route unknown = {"unknown", NULL, route_unknown, ROUTE_OTHER};
+
+const struct route *routes_find(const char *path)
+{
+	for (size_t i = 0; i < sizeof routes / sizeof *routes; i++)
+		if (strcmp(routes[i].path, path) == 0)
+			return &routes[i];
+	for (size_t i = 0; i < sizeof later_paths / sizeof *later_paths; i++) {
+		size_t length = strlen(later_paths[i]);
+		if (strncmp(path, later_paths[i], length) == 0 && (path[length] == '\0' || path[length] == '/'))
+			return &later;
+	}
+	return &unknown;
+}

@@ -1,0 +1,158 @@
+#include "server/scene_canonical.h"
+
+#include "server/number_text.h"
+#include "server/scene_fields.h"
+#include "server/text.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum style { STYLE_JSON, STYLE_QUERY };
+
+static void write_number(double value, struct text *text)
+{
+	char number[NUMBER_TEXT_SIZE];
+	number_format(value, number);
+	text_add(text, number);
+}
+
+static void write_word(const char *word, enum style style, struct text *text)
+{
+	text_printf(text, style == STYLE_JSON ? "\"%s\"" : "%s", word);
+}
+
+static void write_choices(const struct scene_field *field, uint32_t set, enum style style, struct text *text)
+{
+	const char *separator = "";
+	for (int i = 0; field->choices[i]; i++) {
+		if (!(set >> i & 1))
+			continue;
+		text_add(text, separator);
+		write_word(field->choices[i], style, text);
+		separator = ",";
+	}
+}
+
+static void write_numbers(const double *numbers, int count, struct text *text)
+{
+	for (int i = 0; i < count; i++) {
+		text_add(text, i ? "," : "");
+		write_number(numbers[i], text);
+	}
+}
+
+static void write_value(const struct scene_field *field, const struct scene_input *input, enum style style, struct text *text)
+{
+	const void *value = (const char *)input + field->offset;
+	bool list = field->type == FIELD_NUMBERS || field->type == FIELD_CHOICES;
+	if (list && style == STYLE_JSON)
+		text_add(text, "[");
+	switch (field->type) {
+	case FIELD_NUMBER_OR_AUTO:
+		if (*(const bool *)((const char *)input + field->auto_offset))
+			write_word("auto", style, text);
+		else
+			write_number(*(const double *)value, text);
+		break;
+	case FIELD_NUMBER:
+	case FIELD_TIME:
+		write_number(*(const double *)value, text);
+		break;
+	case FIELD_NUMBERS:
+		write_numbers(value, field->count, text);
+		break;
+	case FIELD_INTEGER:
+		text_printf(text, "%d", *(const int *)value);
+		break;
+	case FIELD_SEED:
+		text_printf(text, "%u", *(const uint32_t *)value);
+		break;
+	case FIELD_BOOLEAN:
+		text_add(text, *(const bool *)value ? "true" : "false");
+		break;
+	case FIELD_CHOICE:
+		write_word(field->choices[*(const unsigned *)value], style, text);
+		break;
+	case FIELD_CHOICES:
+		write_choices(field, *(const uint32_t *)value, style, text);
+		break;
+	case FIELD_NAME:
+		write_word(value, style, text);
+		break;
+	}
+	if (list && style == STYLE_JSON)
+		text_add(text, "]");
+}
+
+/* Has the member a meaning in this scene? Those without are refused when given, so the canonical form must not hold them. */
+static bool is_meaningful(const struct scene_field *field, const struct scene *scene)
+{
+	if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER))
+		return false;
+	if (strcmp(field->section, "ground") == 0 && strcmp(field->name, "albedo") == 0)
+		return scene->ground.type == GROUND_LAMBERT;
+	return true;
+}
+
+/* Writes the sections for which `wanted` is true; NULL: all. */
+static void write_json(const struct scene *scene, bool (*wanted)(const struct scene_field *field), struct text *text)
+{
+	const struct scene_input input = {.scene = *scene};
+	const char *section = NULL;
+	text_add(text, "{");
+	for (const struct scene_field *field = scene_fields; field->section; field++) {
+		if (!is_meaningful(field, scene) || (wanted && !wanted(field)))
+			continue;
+		if (!section || strcmp(section, field->section) != 0) {
+			text_printf(text, "%s\"%s\":{", section ? "}," : "", field->section);
+			section = field->section;
+		} else {
+			text_add(text, ",");
+		}
+		text_printf(text, "\"%s\":", field->name);
+		write_value(field, &input, STYLE_JSON, text);
+	}
+	text_add(text, section ? "}}" : "}");
+}
+
+char *scene_canonical(const struct scene *scene)
+{
+	struct text text = {0};
+	write_json(scene, NULL, &text);
+	return text_take(&text);
+}
+
+char *scene_canonical_query(const struct scene *scene)
+{
+	const struct scene_input input = {.scene = *scene}, defaults = scene_input_default();
+	struct text text = {0};
+	for (const struct scene_field *field = scene_fields; field->section; field++) {
+		struct text value = {0}, usual = {0};
+		write_value(field, &input, STYLE_QUERY, &value);
+		write_value(field, &defaults, STYLE_QUERY, &usual);
+		bool differs = value.failed || usual.failed || strcmp(value.data, usual.data) != 0;
+		if (is_meaningful(field, scene) && differs)
+			text_printf(&text, "%s%s.%s=%s", text.length ? "&" : "", field->section, field->name,
+				    value.failed ? "" : value.data);
+		text.failed |= value.failed || usual.failed;
+		text_finish(&value);
+		text_finish(&usual);
+	}
+	return text_take(&text);
+}
+
+static bool is_shared_between_frames(const struct scene_field *field)
+{
+	return strcmp(field->section, "dsd") == 0 || strcmp(field->section, "atmosphere") == 0 ||
+	       (strcmp(field->section, "model") == 0 && strcmp(field->name, "optics") == 0);
+}
+
+void scene_canonical_key(const struct scene *scene, char key[static DIGEST_SIZE])
+{
+	struct text text = {0};
+	write_json(scene, is_shared_between_frames, &text);
+	key[0] = '\0';
+	if (!text.failed)
+		digest_of(text.data, text.length, key);
+	text_finish(&text);
+}

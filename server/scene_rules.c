@@ -1,0 +1,135 @@
+#include "server/scene_rules.h"
+
+#include "server/sun_position.h"
+
+#include <stdio.h>
+
+static bool given(const struct scene_input *input, const char *section, const char *name)
+{
+	return scene_field_given(input, scene_field_find(section, name));
+}
+
+/* Adds the same detail to each of the members of a section that were given. */
+static void refuse_given(const struct scene_input *input, const char *section, const char *const *names, const char *detail,
+			 struct problem *problem)
+{
+	for (; *names; names++) {
+		char pointer[64];
+		snprintf(pointer, sizeof pointer, "/%s/%s", section, *names);
+		if (given(input, section, *names))
+			problem_add(problem, pointer, "%s", detail);
+	}
+}
+
+static void resolve_sun(struct scene_input *input, struct problem *problem)
+{
+	static const char *const angles[] = {"elevation_deg", "azimuth_deg", NULL};
+	static const char *const place[] = {"time", "latitude_deg", "longitude_deg", NULL};
+	int count = 0;
+	for (int i = 0; place[i]; i++)
+		count += given(input, "sun", place[i]);
+	if (count == 0)
+		return;
+	refuse_given(input, "sun", angles, "is given by time, latitude_deg and longitude_deg already: give one form", problem);
+	for (int i = 0; place[i]; i++) {
+		char pointer[64];
+		snprintf(pointer, sizeof pointer, "/sun/%s", place[i]);
+		if (!given(input, "sun", place[i]))
+			problem_add(problem, pointer, "is needed: time, latitude_deg and longitude_deg go together");
+	}
+	if (problem_mentions(problem, "/sun"))
+		return;
+	struct scene_sun sun = sun_position_at(input->julian_day, input->latitude_deg, input->longitude_deg);
+	if (sun.elevation_deg < scene_field_find("sun", "elevation_deg")->range[0].low)
+		problem_add(problem, "/sun/time", "the sun is %.1f degrees below the horizon then and there: at most 18",
+			    -sun.elevation_deg);
+	else
+		input->scene.sun = sun;
+}
+
+static void resolve_dsd(struct scene_input *input, struct problem *problem)
+{
+	static const char *const radius[] = {"effective_radius_um", NULL};
+	struct scene_dsd *dsd = &input->scene.dsd;
+	bool characteristic = given(input, "dsd", "characteristic_radius_um");
+	if (characteristic)
+		refuse_given(input, "dsd", radius, "is given by characteristic_radius_um already: give one form", problem);
+	if (problem_mentions(problem, "/dsd"))
+		return;
+	if (characteristic) {
+		const struct field_range *range = scene_field_find("dsd", "effective_radius_um")->range;
+		dsd->effective_radius_um = input->characteristic_radius_um * (dsd->gamma + 2);
+		if (!(dsd->effective_radius_um >= range->low && dsd->effective_radius_um <= range->high)) {
+			problem_add(problem, "/dsd/characteristic_radius_um",
+				    "gives an effective radius of %.4g um, which must be from 1 to 30", dsd->effective_radius_um);
+			return;
+		}
+	}
+	double water = scene_dsd_liquid_water(dsd);
+	if (!(water <= 5))
+		problem_add(problem, "/dsd", "holds %.3g g/m3 of liquid water: at most 5", water);
+}
+
+static void check_clouds(const struct scene_input *input, struct problem *problem)
+{
+	static const char *const procedural[] = {"type", "seed", "coverage", NULL};
+	if (given(input, "clouds", "map"))
+		refuse_given(input, "clouds", procedural, "does not go with a map", problem);
+}
+
+static void check_ground(struct scene_input *input, struct problem *problem)
+{
+	static const char *const albedo[] = {"albedo", NULL};
+	static const char *const procedural[] = {"type", "albedo", NULL};
+	struct scene_ground *ground = &input->scene.ground;
+	if (given(input, "ground", "map"))
+		refuse_given(input, "ground", procedural, "does not go with a map", problem);
+	if (problem_mentions(problem, "/ground"))
+		return;
+	if (ground->type != GROUND_LAMBERT) {
+		refuse_given(input, "ground", albedo, "goes with the type lambert only", problem);
+		/* One scene, one content: an unused albedo must not make two scenes of one. */
+		ground->albedo[0] = ground->albedo[1] = ground->albedo[2] = 0;
+	}
+	for (int i = 0; i < 3; i++)
+		if (ground->albedo[i] * ground->albedo_scale > 1)
+			problem_add(problem, "/ground/albedo_scale", "times the albedo exceeds 1");
+}
+
+static void check_camera(const struct scene_input *input, struct problem *problem)
+{
+	static const char *const directions[] = {"azimuth_deg", "elevation_deg", "roll_deg", "vertical_fov_deg", NULL};
+	const struct scene *scene = &input->scene;
+	const struct scene_clouds *clouds = &scene->clouds;
+	if (scene->camera.projection != PROJECTION_PERSPECTIVE)
+		refuse_given(input, "camera", directions, "does not go with a panorama", problem);
+	if (problem_mentions(problem, "/camera/position_m") || problem_mentions(problem, "/clouds"))
+		return;
+	double z = scene->camera.position_m[2];
+	bool has_clouds = clouds->type != CLOUD_NONE && clouds->thickness_m > 0;
+	if (has_clouds && scene->model.name == MODEL_SLAB && z >= clouds->base_m && z <= clouds->base_m + clouds->thickness_m)
+		problem_add(problem, "/camera/position_m/2", "lies inside the cloud layer (%g to %g m), where the slab model has no view",
+			    clouds->base_m, clouds->base_m + clouds->thickness_m);
+}
+
+static void check_output(const struct scene_input *input, struct problem *problem)
+{
+	const struct scene_output *output = &input->scene.output;
+	if (problem_mentions(problem, "/output"))
+		return;
+	if (output->format == IMAGE_PNG && output->layers != 1u << LAYER_COLOR)
+		problem_add(problem, "/output/layers", "other layers than color need the format exr");
+	int64_t pixels = (int64_t)output->width * output->height * __builtin_popcount(output->layers);
+	if (pixels > SCENE_PIXELS_MAX)
+		problem_add(problem, "/output", "width x height x layers is %lld pixels: at most %d", (long long)pixels, SCENE_PIXELS_MAX);
+}
+
+void scene_rules_apply(struct scene_input *input, struct problem *problem)
+{
+	resolve_sun(input, problem);
+	resolve_dsd(input, problem);
+	check_clouds(input, problem);
+	check_ground(input, problem);
+	check_camera(input, problem);
+	check_output(input, problem);
+}

@@ -1,0 +1,161 @@
+#include "server/service.h"
+
+#include "renderer/log.h"
+#include "renderer/optics/kernel.h"
+#include "server/clock.h"
+#include "server/http.h"
+#include "server/response.h"
+#include "server/text.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+/* A render longer than this is a hang that a restart cures. */
+#define HANG_MS 300000.0
+
+static size_t worker_count(const struct config *config)
+{
+	long processors = sysconf(_SC_NPROCESSORS_ONLN);
+	if (config->workers > 0)
+		return (size_t)config->workers;
+	return processors < 1 ? 1 : processors > 16 ? 16 : (size_t)processors;
+}
+
+/* What an entity tag must know besides the scene. Shaders read from disk may change between two starts of one version, so a start then
+ * counts as a version of its own. */
+static char *pixel_version(const struct service *service)
+{
+	struct text text = {0};
+	const struct renderer_info *info = render_thread_info(service->render_thread);
+	text_printf(&text, "%s|%s|%s|%s|%d|%llx", RENDERER_VERSION, info->vendor, info->renderer, info->version, (int)info->pass_kind,
+		    kernel_hash(render_thread_kernel(service->render_thread)));
+	if (service->config->shader_dir)
+		text_printf(&text, "|%d|%f", (int)getpid(), clock_now_ms());
+	return text_take(&text);
+}
+
+static void *load_images(void *context)
+{
+	struct service *service = context;
+	service->images = image_module_load(service->config->image_module);
+	return NULL;
+}
+
+/* The image module takes as long to load as OpenGL to start: both at once. The module is never unloaded. */
+static bool start_rendering(struct service *service)
+{
+	pthread_t loader;
+	service->render_thread = render_thread_create(service->config, service->queue);
+	if (!service->render_thread)
+		return false;
+	if (pthread_create(&loader, NULL, load_images, service) != 0) {
+		log_error("service_create: pthread_create failed");
+		return false;
+	}
+	pthread_join(loader, NULL);
+	return service->images != NULL;
+}
+
+struct service *service_create(const struct config *config)
+{
+	struct service *service = calloc(1, sizeof *service);
+	if (!service) {
+		log_error("service_create: out of memory");
+		return NULL;
+	}
+	size_t workers = worker_count(config);
+	service->config = config;
+	service->listening_socket = -1;
+	service->metrics = metrics_create();
+	service->queue = render_queue_create((size_t)config->queue_length);
+	service->workers = worker_pool_create(workers, 2 * workers);
+	if (service->metrics && service->queue && service->workers && http_start(service) && start_rendering(service))
+		return service;
+	service_destroy(service);
+	return NULL;
+}
+
+enum service_state service_wait(struct service *service, int milliseconds)
+{
+	double until = clock_now_ms() + milliseconds;
+	enum render_thread_state state;
+	while ((state = render_thread_state(service->render_thread)) == RENDER_THREAD_STARTING && clock_now_ms() < until)
+		usleep(5000);
+	if (state == RENDER_THREAD_READY && !service->ready) {
+		service->pixel_version = pixel_version(service);
+		service->ready = service->pixel_version != NULL;
+	}
+	return service_state(service);
+}
+
+/* Answers to accepted requests go out; a client that does not read its answer is not waited for longer than a request may take. */
+static void drain(struct service *service)
+{
+	double limit = clock_now_ms() + service->config->timeout_ms + 5000;
+	while (service->in_flight > 0 && clock_now_ms() < limit)
+		usleep(5000);
+	service->giving_up = true;
+}
+
+/* libmicrohttpd must not stop while a connection is suspended. Jobs are abandoned between two passes, so this is quick unless one hangs;
+ * then nothing is left that could be saved. */
+static void await_suspended(struct service *service)
+{
+	double limit = clock_now_ms() + 10000;
+	while (service->suspended > 0 && clock_now_ms() < limit)
+		usleep(1000);
+	if (service->suspended > 0) {
+		log_error("shutdown: a render hangs, leaving it");
+		_exit(EXIT_FAILURE);
+	}
+}
+
+void service_destroy(struct service *service)
+{
+	if (!service)
+		return;
+	service->stopping = true;
+	http_quiesce(service);
+	drain(service);
+	await_suspended(service);
+	http_stop(service);
+	if (service->queue)
+		render_queue_close(service->queue);
+	render_thread_destroy(service->render_thread);
+	worker_pool_destroy(service->workers);
+	render_queue_destroy(service->queue);
+	metrics_destroy(service->metrics);
+	free(service->pixel_version);
+	free(service);
+}
+
+enum service_state service_state(const struct service *service)
+{
+	if (service->render_thread && render_thread_state(service->render_thread) == RENDER_THREAD_FAILED)
+		return SERVICE_FAILED;
+	if (service->render_thread && render_thread_busy_ms(service->render_thread) > HANG_MS)
+		return SERVICE_FAILED;
+	if (service->stopping)
+		return SERVICE_STOPPING;
+	return service->ready ? SERVICE_READY : SERVICE_STARTING;
+}
+
+unsigned service_retry_seconds(const struct service *service)
+{
+	double seconds = (double)render_queue_depth(service->queue) * render_thread_typical_ms(service->render_thread) * 1e-3;
+	return seconds < 1 ? 1 : seconds > 60 ? 60 : (unsigned)seconds;
+}
+
+bool service_refuses(struct request *request)
+{
+	struct service *service = request->service;
+	if (service->stopping) {
+		problem_set(&request->problem, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
+		metrics_count_rejection(service->metrics, REJECTED_SHUTTING_DOWN);
+	} else if (!service->ready) {
+		problem_set(&request->problem, PROBLEM_STARTING, "The renderer is not ready yet.");
+		metrics_count_rejection(service->metrics, REJECTED_STARTING);
+	}
+	return service->stopping || !service->ready;
+}

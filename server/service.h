@@ -1,0 +1,63 @@
+/* The HTTP service: libmicrohttpd's threads, the render thread, the workers, and what the routes share. */
+#ifndef STRATUS_SERVER_SERVICE_H
+#define STRATUS_SERVER_SERVICE_H
+
+#include "renderer/image/image.h"
+#include "server/config.h"
+#include "server/metrics.h"
+#include "server/render_queue.h"
+#include "server/render_thread.h"
+#include "server/worker_pool.h"
+
+#include <stdatomic.h>
+
+enum service_state {
+	SERVICE_STARTING,
+	SERVICE_READY,
+	SERVICE_STOPPING, /* finishing what was accepted */
+	SERVICE_FAILED    /* a restart is needed */
+};
+
+struct MHD_Daemon;
+
+/* Read by the routes; what is not atomic does not change from the moment `ready` is true. */
+struct service {
+	const struct config *config;
+	struct metrics *metrics;
+	struct render_queue *queue;
+	struct render_thread *_Atomic render_thread;
+	struct worker_pool *workers;
+	struct MHD_Daemon *daemon;
+	const struct image_api *images;
+	char *pixel_version; /* everything but the scene that decides about an image's bytes */
+	char host[256];      /* listening address as a URL says it */
+	unsigned port;
+	int listening_socket; /* taken from libmicrohttpd while stopping; else negative */
+
+	_Atomic size_t in_flight; /* requests begun and not ended */
+	_Atomic size_t suspended; /* those of them that others work for */
+	_Atomic bool ready;       /* has been ready to render */
+	_Atomic bool stopping;    /* takes no new work */
+	_Atomic bool giving_up;   /* drops the accepted work too */
+};
+
+/* Starts serving; rendering comes up behind. NULL (and a log line) on failure, such as an address in use. Main thread. */
+struct service *service_create(const struct config *config);
+
+/* Waits until the service can render, at most so long. SERVICE_STARTING: not yet. Main thread. */
+enum service_state service_wait(struct service *service, int milliseconds);
+
+/* Takes no new work, finishes what was accepted (within a bound), stops all threads, frees everything. Takes NULL. Main thread. */
+void service_destroy(struct service *service);
+
+/* Any thread. */
+enum service_state service_state(const struct service *service);
+
+/* A guess at when the queue has room again, from 1. Any thread. */
+unsigned service_retry_seconds(const struct service *service);
+
+/* States why the service takes no work at present and counts it. false when it does take work. HTTP thread. */
+struct request;
+bool service_refuses(struct request *request);
+
+#endif

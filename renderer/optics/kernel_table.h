@@ -20,7 +20,7 @@
 enum {
 	KERNEL_NODE_COUNT = 524,
 	KERNEL_PEAK_COUNT = 111, /* Gauss-Legendre nodes of the peak: steps of at most 0.08 degrees */
-	KERNEL_BODY_COUNT = 288, /* and of the body: at most 0.48 degrees, in 35..75 degrees from either end */
+	KERNEL_BODY_COUNT = 456, /* and of the body: at most 0.31 degrees, for the narrow fogbow of large droplets */
 	KERNEL_PAIR_COUNT = 1 + KERNEL_PEAK_COUNT + KERNEL_BODY_COUNT,
 	KERNEL_ANGLE_COUNT = 2 * KERNEL_PAIR_COUNT
 };

@@ -161,18 +161,15 @@ void optics_destroy(struct optics *optics)
 	free(optics);
 }
 
-/* Slope at the middle of three points: 0 at an extremum, else the weighted harmonic mean of both sides (Fritsch & Butland 1984). */
-static double monotone_slope(const double x[3], const double y[3])
+/* Slope at the middle of three points, of the parabola through them. (A monotone cubic, flat at every extremum, clips the fogbow by 1 %.)
+ */
+static double parabola_slope(const double x[3], const double y[3])
 {
 	double left = x[1] - x[0], right = x[2] - x[1];
-	double slope_left = (y[1] - y[0]) / left, slope_right = (y[2] - y[1]) / right;
-	if (slope_left * slope_right <= 0)
-		return 0;
-	double weight_left = 2 * right + left, weight_right = right + 2 * left;
-	return (weight_left + weight_right) / (weight_left / slope_left + weight_right / slope_right);
+	return (right / left * (y[1] - y[0]) + left / right * (y[2] - y[1])) / (left + right);
 }
 
-/* Monotone cubic through the logarithms; both ends are extrema by symmetry. */
+/* Cubic through the logarithms, so that no overshoot can reach 0; both ends are extrema by symmetry. */
 static double interpolate(const struct optics *optics, const double *values, double angle)
 {
 	const double *x = optics->angle;
@@ -188,8 +185,8 @@ static double interpolate(const struct optics *optics, const double *values, dou
 		y[i - first] = log(values[i]);
 	const double *here = &y[low - first];
 	double step = x[high] - x[low], t = fmin(fmax((angle - x[low]) / step, 0), 1);
-	double slope_low = inner_left ? monotone_slope(&x[low - 1], y) : 0;
-	double slope_high = inner_right ? monotone_slope(&x[low], here) : 0;
+	double slope_low = inner_left ? parabola_slope(&x[low - 1], y) : 0;
+	double slope_high = inner_right ? parabola_slope(&x[low], here) : 0;
 	double rise = here[1] - here[0];
 	double bend = (1 - t) * (step * slope_low - rise) + t * (rise - step * slope_high);
 	return exp(here[0] + t * rise + t * (1 - t) * bend);

@@ -44,7 +44,8 @@ struct optics {
 struct optics *optics_create(const struct kernel *kernel, const struct scene_dsd *dsd, enum optics_model model);
 void optics_destroy(struct optics *optics);
 
-/* P at an angle in 0..pi (clamped) by interpolation between the table's angles, error below 0.1 %. Any thread. */
+/* P at an angle in 0..pi (clamped) by interpolation between the table's angles, error 0.01 %, and at most 0.4 % (fogbow
+ * of the largest droplets). Any thread. */
 double optics_phase(const struct optics *optics, int band, double angle);
 
 /* P_2 likewise. */

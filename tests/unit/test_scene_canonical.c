@@ -1,0 +1,236 @@
+/* The canonical form reads back as itself, and its query means the same scene: over random scenes. */
+#include "server/json_document.h"
+#include "server/number_text.h"
+#include "server/query.h"
+#include "server/scene_canonical.h"
+#include "server/scene_json.h"
+#include "server/scene_query.h"
+#include "server/scene_rules.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static uint64_t random_state = 88172645463325252u;
+
+static uint64_t random_bits(void)
+{
+	random_state ^= random_state << 13;
+	random_state ^= random_state >> 7;
+	return random_state ^= random_state << 17;
+}
+
+static double random_in(const struct field_range *range)
+{
+	double share = (double)(random_bits() >> 11) / 9007199254740992.0;
+	double value = range->low + share * (range->high - range->low);
+	/* Half of them short, as people write them. */
+	return random_bits() & 1 ? value : fmax(range->low, fmin(range->high, round(value * 10) / 10));
+}
+
+/* A value for a field by its type, all choices of this release alike. */
+static json_t *random_value(const struct scene_field *field)
+{
+	json_t *list = json_array();
+	unsigned choice, count = 0;
+	switch (field->type) {
+	case FIELD_NUMBERS:
+		for (int i = 0; i < field->count; i++)
+			json_array_append_new(list, json_real(random_in(&field->range[i])));
+		return list;
+	case FIELD_CHOICES:
+		json_array_append_new(list, json_string(field->choices[0]));
+		for (int i = 1; field->choices[i]; i++)
+			if (random_bits() % 8 == 0)
+				json_array_append_new(list, json_string(field->choices[i]));
+		return list;
+	default:
+		json_decref(list);
+	}
+	switch (field->type) {
+	case FIELD_BOOLEAN:
+		return json_boolean(random_bits() & 1);
+	case FIELD_CHOICE:
+		while (field->choices[count])
+			count++;
+		do
+			choice = (unsigned)(random_bits() % count);
+		while (field->choices_later >> choice & 1);
+		return json_string(field->choices[choice]);
+	case FIELD_INTEGER:
+		return json_real(field->flags & FIELD_POWER_OF_TWO ? field->range[0].high : floor(random_in(&field->range[0])));
+	case FIELD_SEED:
+		return json_real(floor(random_in(&field->range[0])));
+	case FIELD_NUMBER_OR_AUTO:
+		return random_bits() & 1 ? json_string("auto") : json_real(random_in(&field->range[0]));
+	default:
+		return json_real(random_in(&field->range[0]));
+	}
+}
+
+/* A random scene that obeys the rules across members; the others are thrown away. */
+static bool random_scene(struct scene *scene)
+{
+	struct scene_input input = scene_input_default();
+	struct problem problem = {0};
+	for (const struct scene_field *field = scene_fields; field->section; field++) {
+		if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER) || random_bits() % 3 == 0)
+			continue;
+		json_t *value = random_value(field);
+		scene_json_read_field(field, value, "/x", &input, &problem);
+		json_decref(value);
+	}
+	assert_int_equal(problem.kind, PROBLEM_NONE);
+	scene_rules_apply(&input, &problem);
+	bool valid = problem.kind == PROBLEM_NONE;
+	problem_finish(&problem);
+	*scene = input.scene;
+	return valid;
+}
+
+static struct scene scene_of_text(const char *body)
+{
+	struct scene_input input = scene_input_default();
+	struct problem problem = {0};
+	char *text = strdup(body);
+	json_t *root = json_document_parse(text, strlen(text), &problem);
+	scene_json_read(root, &input, &problem);
+	scene_rules_apply(&input, &problem);
+	if (problem.kind != PROBLEM_NONE)
+		fail_msg("%s: %s", body, problem.error_count ? problem.errors[0].pointer : problem.detail);
+	json_decref(root);
+	free(text);
+	return input.scene;
+}
+
+static struct scene scene_of_query(const char *text)
+{
+	struct scene_input input = scene_input_default();
+	struct problem problem = {0};
+	struct query query;
+	assert_true(query_parse(text, &query, &problem));
+	scene_query_read(&query, NULL, &input, &problem);
+	scene_rules_apply(&input, &problem);
+	if (problem.kind != PROBLEM_NONE)
+		fail_msg("%s: %s", text, problem.error_count ? problem.errors[0].pointer : problem.detail);
+	query_finish(&query);
+	return input.scene;
+}
+
+static void test_round_trips(void **state)
+{
+	(void)state;
+	int tried = 0;
+	for (int i = 0; i < 20000 && tried < 500; i++) {
+		struct scene scene;
+		if (!random_scene(&scene))
+			continue;
+		tried++;
+		char *first = scene_canonical(&scene), *query = scene_canonical_query(&scene);
+		struct scene again = scene_of_text(first), twin = scene_of_query(query);
+		char *second = scene_canonical(&again), *third = scene_canonical(&twin);
+		assert_string_equal(first, second);
+		assert_string_equal(first, third);
+		free(first), free(query), free(second), free(third);
+	}
+	assert_int_equal(tried, 500);
+}
+
+static void test_default_form(void **state)
+{
+	(void)state;
+	struct scene scene = scene_of_text("{}");
+	char *canonical = scene_canonical(&scene), *query = scene_canonical_query(&scene);
+	assert_string_equal(query, "");
+	assert_string_equal(
+		canonical,
+		"{\"sun\":{\"elevation_deg\":35,\"azimuth_deg\":140},\"dsd\":{\"n0_per_cm3\":300,\"gamma\":2,\"effective_radius_um\":7},"
+		"\"clouds\":{\"type\":\"stratocumulus\",\"seed\":1,\"time_s\":0,\"coverage\":0.7,\"base_m\":1200,\"thickness_m\":400,"
+		"\"tile_m\":20000,\"resolution\":512,\"wind_mps\":[8,3]},\"ground\":{\"type\":\"country\",\"albedo_scale\":1},"
+		"\"atmosphere\":{\"aerosol_optical_depth\":0.1,\"ozone_du\":300},\"camera\":{\"position_m\":[0,0,2],\"azimuth_deg\":140,"
+		"\"elevation_deg\":20,\"roll_deg\":0,\"vertical_fov_deg\":60,\"projection\":\"perspective\"},\"radiosity\":{\"enabled\":"
+		"true,"
+		"\"tolerance\":0.001,\"max_passes\":64},\"model\":{\"name\":\"slab\",\"shading\":\"paper\",\"optics\":\"mie\"},"
+		"\"output\":{\"width\":1024,\"height\":768,\"format\":\"png\",\"exposure_ev\":\"auto\",\"tone\":\"filmic\",\"layers\":["
+		"\"color\"],"
+		"\"exr_compression\":\"zip\",\"exr_type\":\"auto\",\"png_compression\":\"fast\",\"bits\":8}}");
+	free(canonical), free(query);
+}
+
+static void test_key(void **state)
+{
+	(void)state;
+	char plain[DIGEST_SIZE], camera[DIGEST_SIZE], droplets[DIGEST_SIZE], air[DIGEST_SIZE];
+	struct scene scene = scene_of_text("{}");
+	scene_canonical_key(&scene, plain);
+	scene = scene_of_text("{\"camera\":{\"azimuth_deg\":3},\"model\":{\"shading\":\"paper\"}}");
+	scene_canonical_key(&scene, camera);
+	scene = scene_of_text("{\"dsd\":{\"gamma\":3}}");
+	scene_canonical_key(&scene, droplets);
+	scene = scene_of_text("{\"atmosphere\":{\"ozone_du\":3}}");
+	scene_canonical_key(&scene, air);
+	assert_string_equal(plain, camera);
+	assert_string_not_equal(plain, droplets);
+	assert_string_not_equal(plain, air);
+}
+
+static void test_numbers(void **state)
+{
+	(void)state;
+	static const struct {
+		double value;
+		const char *text;
+	} cases[] = {{0, "0"},
+		     {-0.0, "0"},
+		     {1, "1"},
+		     {-18, "-18"},
+		     {0.1, "0.1"},
+		     {1e7, "10000000"},
+		     {4294967295.0, "4294967295"},
+		     {1e-6, "0.000001"},
+		     {1e-7, "1e-7"},
+		     {1.5e-7, "1.5e-7"},
+		     {1e21, "1e21"},
+		     {1e20, "100000000000000000000"},
+		     {123.456, "123.456"},
+		     {1.0 / 3, "0.3333333333333333"},
+		     {-1e6, "-1000000"},
+		     {0.30000000000000004, "0.30000000000000004"}};
+	char text[NUMBER_TEXT_SIZE];
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		number_format(cases[i].value, text);
+		assert_string_equal(text, cases[i].text);
+	}
+	for (int i = 0; i < 20000; i++) {
+		union {
+			uint64_t bits;
+			double value;
+		} number = {.bits = random_bits()};
+		double back;
+		if (!isfinite(number.value))
+			continue;
+		number_format(number.value, text);
+		assert_true(number_parse(text, &back));
+		assert_true(back == number.value);
+	}
+	static const char *const bad[] = {"", "-", "+1", "01", "1.", ".5", "1e", "0x10", "nan", "inf", "1 ", " 1", "1e999", "1,2"};
+	double ignored;
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+		assert_false(number_parse(bad[i], &ignored));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_round_trips),
+		cmocka_unit_test(test_default_form),
+		cmocka_unit_test(test_key),
+		cmocka_unit_test(test_numbers),
+	};
+	return cmocka_run_group_tests_name("scene_canonical", tests, NULL, NULL);
+}

@@ -18,6 +18,7 @@ struct renderer {
 	struct gl_context *gl;
 	struct renderer_info info;
 	struct stage_context context;
+	struct ground_stage ground;
 	struct sky_stage sky;
 	struct field_stage field;
 	struct radiosity_stage radiosity;
@@ -31,8 +32,9 @@ enum { DEFAULT_CACHE_BYTES = 256 << 20 };
 
 static bool compile_stages(struct renderer *renderer, const struct pass_compiler *compiler)
 {
-	return sky_stage_init(&renderer->sky, compiler) && field_stage_init(&renderer->field, compiler) &&
-	       radiosity_stage_init(&renderer->radiosity, compiler) && view_stage_init(&renderer->view, compiler);
+	return ground_stage_init(&renderer->ground, compiler) && sky_stage_init(&renderer->sky, compiler) &&
+	       field_stage_init(&renderer->field, compiler) && radiosity_stage_init(&renderer->radiosity, compiler) &&
+	       view_stage_init(&renderer->view, compiler);
 }
 
 static void finish_stages(struct renderer *renderer)
@@ -41,6 +43,7 @@ static void finish_stages(struct renderer *renderer)
 	radiosity_stage_finish(&renderer->radiosity);
 	field_stage_finish(&renderer->field);
 	sky_stage_finish(&renderer->sky);
+	ground_stage_finish(&renderer->ground);
 }
 
 /* Small scene that exercises every pass, for measuring and for having every shader built before the first request. */
@@ -159,7 +162,7 @@ struct job {
 	void *cancel_context;
 	struct frame *frame;
 
-	double mean_albedo[3], max_albedo;
+	struct ground_maps ground;
 	const struct droplets *droplets;
 	const struct slab_tables *slab;
 	struct sky_tables sky;
@@ -180,7 +183,9 @@ static bool run_optics(struct job *job)
 
 static bool run_sky(struct job *job)
 {
-	return sky_stage_run(&job->renderer->sky, &job->renderer->context, job->scene, job->mean_albedo, &job->sky);
+	struct stage_context *context = &job->renderer->context;
+	return ground_stage_run(&job->renderer->ground, context, job->scene, &job->ground) &&
+	       sky_stage_run(&job->renderer->sky, context, job->scene, job->ground.mean, &job->sky);
 }
 
 static bool run_field(struct job *job)
@@ -195,8 +200,8 @@ static bool run_radiosity(struct job *job)
 	for (int band = 0; band < 3; band++)
 		block->air_below[band] = 1;
 	job->clouds = job->maps.coarse != NULL;
-	return !job->clouds || radiosity_stage_run(&job->renderer->radiosity, &job->renderer->context, job->scene, job->max_albedo,
-						   &job->sky, &job->maps, job->slab, &job->light);
+	return !job->clouds || radiosity_stage_run(&job->renderer->radiosity, &job->renderer->context, job->scene, &job->ground, &job->sky,
+						   &job->maps, job->slab, &job->light);
 }
 
 /* Horizontal illuminance at the camera: above the clouds by the clear sky, below them means over the tile. */
@@ -244,7 +249,8 @@ static bool run_view(struct job *job)
 	struct stage_context *context = &renderer->context;
 	const struct scene_output *output = &job->scene->output;
 	struct frame *frame = job->frame;
-	const struct view_inputs inputs = {.droplets = job->droplets,
+	const struct view_inputs inputs = {.ground = &job->ground,
+					   .droplets = job->droplets,
 					   .slab = job->slab,
 					   .sky = &job->sky,
 					   .field = &job->maps,
@@ -352,7 +358,6 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	}
 	cache_begin_frame(renderer->context.cache);
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
-	job.max_albedo = ground_mean_reflectance(&scene->ground, job.mean_albedo);
 	view_fill_block(&renderer->context.block, scene);
 	/* The sky is tabulated up to the layer, so its heights are known before the field is. */
 	renderer->context.block.cloud_layer[0] = (float)scene->clouds.base_m;

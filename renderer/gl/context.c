@@ -127,8 +127,9 @@ static bool find_platform(struct gl_context *context, int device_index)
 static void GLAPIENTRY debug_message(GLenum source, GLenum type, GLuint id, GLenum severity, GLsizei length, const GLchar *text,
 				     const void *user)
 {
-	(void)source, (void)id, (void)length, (void)user;
-	if (severity == GL_DEBUG_SEVERITY_NOTIFICATION)
+	(void)id, (void)length, (void)user;
+	/* The compiler's messages come with the info log, which is read whole. */
+	if (severity == GL_DEBUG_SEVERITY_NOTIFICATION || source == GL_DEBUG_SOURCE_SHADER_COMPILER)
 		return;
 	const bool error = type == GL_DEBUG_TYPE_ERROR;
 	log_line(error ? LOG_ERROR : severity == GL_DEBUG_SEVERITY_HIGH ? LOG_WARNING : LOG_DEBUG, "gl: %s", text);

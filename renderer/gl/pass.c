@@ -35,13 +35,14 @@ static void append_fragment_wrapper(struct source *source, int outputs)
 static void append_compute_wrapper(struct source *source, int outputs)
 {
 	source_print(source, "layout(local_size_x = %d, local_size_y = %d) in;\n", GROUP_SIDE, GROUP_SIDE);
-	source_print(source, "uniform ivec2 pass_size;\n");
-	source_print(source, "#define STORE(i, value) imageStore(output_##i, ivec2(gl_GlobalInvocationID.xy), value)\n");
+	source_print(source, "uniform ivec4 pass_size; // columns, rows, first row\n");
+	source_print(source,
+		     "#define STORE(i, value) imageStore(output_##i, ivec2(gl_GlobalInvocationID.xy) + ivec2(0, pass_size.z), value)\n");
 	for (int i = 0; i < outputs; i++)
 		source_print(source, "layout(binding = %d) writeonly uniform image2D output_%d;\n", i, i);
 	source_print(source, "void pass(ivec2 pixel);\nvoid main() {\n"
 			     "\tivec2 pixel = ivec2(gl_GlobalInvocationID.xy);\n"
-			     "\tif (all(lessThan(pixel, pass_size))) pass(pixel);\n}\n");
+			     "\tif (all(lessThan(pixel, pass_size.xy))) pass(pixel + ivec2(0, pass_size.z));\n}\n");
 }
 
 static bool assemble(struct source *source, const struct pass_compiler *compiler, const struct pass_desc *desc, bool compute)
@@ -162,7 +163,7 @@ static void run_compute(const struct pass *pass, const struct pass_run *run, int
 	for (int i = 0; i < pass->outputs; i++)
 		glBindImageTexture((GLuint)i, run->targets[i]->id, run->level, GL_FALSE, 0, GL_WRITE_ONLY,
 				   texture_internal_format(run->targets[i]->format));
-	glProgramUniform2i(pass->program, pass->size, width, height);
+	glProgramUniform4i(pass->program, pass->size, width, height, run->first_row, 0);
 	glDispatchCompute((GLuint)(width + GROUP_SIDE - 1) / GROUP_SIDE, (GLuint)(height + GROUP_SIDE - 1) / GROUP_SIDE, 1);
 	glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
@@ -176,7 +177,9 @@ static void run_fragment(const struct pass *pass, const struct pass_run *run, in
 		glNamedFramebufferTexture(pass->framebuffer, buffers[i], run->targets[i]->id, run->level);
 	glNamedFramebufferDrawBuffers(pass->framebuffer, pass->outputs, buffers);
 	glBindFramebuffer(GL_DRAW_FRAMEBUFFER, pass->framebuffer);
-	glViewport(0, 0, width, height);
+	glViewport(0, 0, width, run->first_row + height);
+	glEnable(GL_SCISSOR_TEST);
+	glScissor(0, run->first_row, width, height);
 	glBindVertexArray(pass->vertex_array);
 	glDrawArrays(GL_TRIANGLES, 0, 3);
 	/* Detached again, so that a texture deleted later is really freed, and none stays attached while it is sampled. */

@@ -18,10 +18,10 @@ static void droplets_destroy(void *value)
 	free(droplets);
 }
 
-/* Angle of a column of the phase table: uniform in sin(angle/2) in front, in cos(angle/2) behind (shaders/lib/optics.glsl). */
-static double column_angle(int column)
+/* Angle of a column of the phase tables: uniform in sin(angle/2) in front, in cos(angle/2) behind (shaders/lib/optics.glsl). */
+static double column_angle(int column, int width)
 {
-	const double unit = (double)column / (PHASE_TABLE_WIDTH - 1);
+	const double unit = (double)column / (width - 1);
 	return unit < 0.5 ? 2 * asin(unit * M_SQRT2) : 2 * acos(fmin(1, (1 - unit) * M_SQRT2));
 }
 
@@ -32,10 +32,10 @@ static bool upload_phase(struct droplets *droplets)
 	if (!rows)
 		return false;
 	for (int i = 0; i < PHASE_TABLE_WIDTH; i++) {
-		const double angle = column_angle(i);
+		const double angle = column_angle(i, PHASE_TABLE_WIDTH);
 		for (int band = 0; band < BAND_COUNT; band++) {
-			rows[0][i][band] = (float)log(fmax(1e-12, optics_phase(droplets->optics, band, angle)));
-			rows[1][i][band] = (float)log(fmax(1e-12, optics_phase2(droplets->optics, band, angle)));
+			rows[0][i][band] = (float)log2(fmax(1e-12, optics_phase(droplets->optics, band, angle)));
+			rows[1][i][band] = (float)log2(fmax(1e-12, optics_phase2(droplets->optics, band, angle)));
 		}
 	}
 	const bool ok = texture_init(&droplets->phase, PHASE_TABLE_WIDTH, 2, TEXTURE_RGBA32F, 0);
@@ -61,14 +61,33 @@ static bool upload_bands(struct texture *texture, int width, int height, const f
 	return ok;
 }
 
+/* The blur, which is smooth, from its even steps in angle to the columns of the phase tables. */
+static void resample_blur(const struct forward_tables *tables, float (*rows)[BLUR_ANGLE_COUNT][BAND_COUNT])
+{
+	for (int i = 0; i < BLUR_ANGLE_COUNT; i++) {
+		const double at = column_angle(i, BLUR_ANGLE_COUNT) / M_PI * (BLUR_ANGLE_COUNT - 1);
+		const int k = (int)fmin(at, BLUR_ANGLE_COUNT - 2);
+		const double share = at - k;
+		for (int depth = 0; depth < FORWARD_DEPTH_COUNT; depth++)
+			for (int band = 0; band < BAND_COUNT; band++)
+				rows[depth][i][band] =
+					(float)((1 - share) * tables->blur[depth][k][band] + share * tables->blur[depth][k + 1][band]);
+	}
+}
+
 static bool upload_forward(struct droplets *droplets)
 {
 	struct forward_tables *tables = malloc(sizeof *tables);
-	if (!tables)
-		return false;
+	float(*blur)[BLUR_ANGLE_COUNT][BAND_COUNT] = malloc(sizeof tables->blur);
+	bool ok = false;
+	if (!tables || !blur)
+		goto end;
 	forward_tables_compute(droplets->optics, tables);
-	const bool ok = upload_bands(&droplets->forward_peak, FORWARD_ANGLE_COUNT, FORWARD_DEPTH_COUNT, &tables->peak[0][0][0]) &&
-			upload_bands(&droplets->forward_blur, BLUR_ANGLE_COUNT, FORWARD_DEPTH_COUNT, &tables->blur[0][0][0]);
+	resample_blur(tables, blur);
+	ok = upload_bands(&droplets->forward_peak, FORWARD_ANGLE_COUNT, FORWARD_DEPTH_COUNT, &tables->peak[0][0][0]) &&
+	     upload_bands(&droplets->forward_blur, BLUR_ANGLE_COUNT, FORWARD_DEPTH_COUNT, &blur[0][0][0]);
+end:
+	free(blur);
 	free(tables);
 	return ok;
 }

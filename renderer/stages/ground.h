@@ -1,11 +1,28 @@
-/* Mean reflectance of the grounds per band (650, 550, 450 nm), for the light that the air gets back from below. The pictures themselves
- * are drawn by shaders/lib/ground.glsl; a test compares both. Any thread. */
+/* The ground: its reflectance as a picture over the tile, painted once. Part of the sky stage's time, since the air is lit from below by
+ * the picture's mean.
+ */
 #ifndef STRATUS_RENDERER_STAGES_GROUND_H
 #define STRATUS_RENDERER_STAGES_GROUND_H
 
-#include "renderer/scene.h"
+#include "renderer/stages/stage.h"
 
-/* mean: over a tile, 0..1 per band. Returns the largest reflectance that occurs in any band. */
-double ground_mean_reflectance(const struct scene_ground *ground, double mean[3]);
+enum { GROUND_PASS_COUNT = 2 };
+
+struct ground_stage {
+	struct pass *passes[GROUND_PASS_COUNT];
+};
+
+struct ground_maps {
+	const struct texture *map;    /* reflectance per band (650, 550, 450 nm), 0..1 */
+	const struct texture *relief; /* noise of unit variance for what lies close by */
+	double mean[3];               /* of the map */
+	double brightest;             /* no reflectance in the map is larger */
+};
+
+bool ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler);
+void ground_stage_finish(struct ground_stage *stage);
+
+/* Fills in the block's ground members. Maps stay valid for this frame. false (and a log line) when out of memory. */
+bool ground_stage_run(const struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps);
 
 #endif

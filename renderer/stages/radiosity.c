@@ -12,7 +12,8 @@ enum { PASS_SOURCES, PASS_START, PASS_EXCHANGE, PASS_CLOSE };
 static const struct pass_desc pass_descs[RADIOSITY_PASS_COUNT] = {
 	[PASS_SOURCES] = {.file = "shaders/passes/radiosity_sources.glsl",
 			  .outputs = 4,
-			  .samplers = {"transmittance_table", "field_coarse", "field_detail", "slab_sun_table"}},
+			  .samplers = {"transmittance_table", "field_coarse", "field_detail", "slab_sun_table", "ground_map",
+				       "ground_relief"}},
 	[PASS_START] = {.file = "shaders/passes/radiosity_start.glsl",
 			.outputs = 4,
 			.samplers = {"cloud_source", "ground_albedo_plane", "ground_direct"}},
@@ -96,12 +97,13 @@ static void fill_weights(float arguments[PASS_ARGUMENTS][4], const struct scene_
 		arguments[i / 4][i % 4] = (float)weights[i];
 }
 
-static void run_sources(const struct radiosity_stage *stage, struct planes *planes, const struct sky_tables *sky,
-			const struct field_maps *field, const struct slab_tables *slab)
+static void run_sources(const struct radiosity_stage *stage, struct planes *planes, const struct ground_maps *ground,
+			const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab)
 {
 	struct texture *targets[] = {&planes->source, &planes->cloud_albedo, &planes->ground_albedo, &planes->ground_direct};
-	pass_run(stage->passes[PASS_SOURCES],
-		 &(struct pass_run){.targets = targets, .samplers = {sky->transmittance, field->coarse, field->detail, &slab->sun}});
+	pass_run(stage->passes[PASS_SOURCES], &(struct pass_run){.targets = targets,
+								 .samplers = {sky->transmittance, field->coarse, field->detail, &slab->sun,
+									      ground->map, ground->relief}});
 	for (int i = 0; i < 4; i++)
 		texture_build_mipmaps(targets[i]);
 }
@@ -223,7 +225,7 @@ static struct cache_key make_key(const struct scene *scene)
 }
 
 static struct result *result_compute(const struct radiosity_stage *stage, const struct stage_context *context, const struct scene *scene,
-				     double max_albedo, const struct sky_tables *sky, const struct field_maps *field,
+				     const struct ground_maps *ground, const struct sky_tables *sky, const struct field_maps *field,
 				     const struct slab_tables *slab)
 {
 	struct planes planes;
@@ -233,8 +235,8 @@ static struct result *result_compute(const struct radiosity_stage *stage, const 
 		return NULL;
 	}
 	const double cloud_albedo = 1 - paper_spherical_transmittance(scene->clouds.thickness_m * context->block.extinction[3]);
-	result->passes = count_passes(scene, max_albedo, cloud_albedo);
-	run_sources(stage, &planes, sky, field, slab);
+	result->passes = count_passes(scene, ground->brightest, cloud_albedo);
+	run_sources(stage, &planes, ground, sky, field, slab);
 	compute(stage, &planes, scene, result);
 	planes_finish(&planes);
 	return result;
@@ -251,16 +253,16 @@ static void fill_air_below(struct scene_block *block, const struct result *resul
 	}
 }
 
-bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_context *context, const struct scene *scene, double max_albedo,
-			 const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab,
-			 struct radiosity_light *light)
+bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_context *context, const struct scene *scene,
+			 const struct ground_maps *ground, const struct sky_tables *sky, const struct field_maps *field,
+			 const struct slab_tables *slab, struct radiosity_light *light)
 {
 	const struct cache_key key = make_key(scene);
 	struct result *result = cache_find(context->cache, &key);
 	if (!result) {
 		context->reused = false;
 		stage_upload_block(context);
-		result = result_compute(stage, context, scene, max_albedo, sky, field, slab);
+		result = result_compute(stage, context, scene, ground, sky, field, slab);
 		if (!result || !cache_keep(context->cache, &key, result, 2 * texture_bytes(&result->ground_received), result_destroy)) {
 			log_error("radiosity: out of memory");
 			return false;

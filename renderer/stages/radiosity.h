@@ -8,6 +8,7 @@
 
 #include "renderer/stages/droplets.h"
 #include "renderer/stages/field.h"
+#include "renderer/stages/ground.h"
 #include "renderer/stages/sky.h"
 
 enum { RADIOSITY_PASS_COUNT = 4 };
@@ -28,10 +29,10 @@ struct radiosity_light {
 bool radiosity_stage_init(struct radiosity_stage *stage, const struct pass_compiler *compiler);
 void radiosity_stage_finish(struct radiosity_stage *stage);
 
-/* Only for scenes with clouds. max_albedo: largest reflectance of the ground, 0..1. Fills in the block's air_below. The light stays valid
+/* Only for scenes with clouds. Fills in the block's air_below. The light stays valid
  * for this frame. false (and a log line) when out of memory. */
-bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_context *context, const struct scene *scene, double max_albedo,
-			 const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab,
-			 struct radiosity_light *light);
+bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_context *context, const struct scene *scene,
+			 const struct ground_maps *ground, const struct sky_tables *sky, const struct field_maps *field,
+			 const struct slab_tables *slab, struct radiosity_light *light);
 
 #endif

@@ -119,7 +119,7 @@ static const struct air_tables *air_tables_get(const struct sky_stage *stage, st
 
 struct sky_view {
 	struct texture tables[4];
-	double diffuse_cloud[3], diffuse_ground[3], sun_cloud[3], sun_ground[3];
+	double diffuse_cloud[3], diffuse_ground[3], sun_cloud[3], sun_ground[3], sun_camera[3];
 };
 
 static void sky_view_destroy(void *value)
@@ -173,7 +173,7 @@ static void sun_irradiance(const struct scene_block *block, double height, doubl
 }
 
 static struct sky_view *sky_view_compute(const struct sky_stage *stage, const struct stage_context *context, const struct air_tables *air,
-					 double cloud_height)
+					 double cloud_height, double camera_height)
 {
 	struct sky_view *view = calloc(1, sizeof *view);
 	if (!view)
@@ -189,6 +189,7 @@ static struct sky_view *sky_view_compute(const struct sky_stage *stage, const st
 		goto fail;
 	sun_irradiance(&context->block, cloud_height, view->sun_cloud);
 	sun_irradiance(&context->block, 0, view->sun_ground);
+	sun_irradiance(&context->block, camera_height, view->sun_camera);
 	return view;
 
 fail:
@@ -217,7 +218,8 @@ static const struct sky_view *sky_view_get(const struct sky_stage *stage, struct
 	if (view)
 		return view;
 	context->reused = false;
-	view = sky_view_compute(stage, context, air, clouds ? scene->clouds.base_m + scene->clouds.thickness_m : 0);
+	view = sky_view_compute(stage, context, air, clouds ? scene->clouds.base_m + scene->clouds.thickness_m : 0,
+				scene->camera.position_m[2]);
 	if (!view || !cache_keep(context->cache, &key, view, 4 * texture_bytes(&view->tables[0]), sky_view_destroy))
 		return NULL;
 	return view;
@@ -245,6 +247,7 @@ bool sky_stage_run(const struct sky_stage *stage, struct stage_context *context,
 	memcpy(tables->sun_ground, view->sun_ground, sizeof view->sun_ground);
 	for (int band = 0; band < 3; band++) {
 		context->block.sky_irradiance_cloud[band] = (float)view->diffuse_cloud[band];
+		context->block.sun_at_camera[band] = (float)view->sun_camera[band];
 		context->block.sky_irradiance_ground[band] = (float)view->diffuse_ground[band];
 	}
 	return true;

@@ -4,38 +4,57 @@
 #include "renderer/stages/colour.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-#define VIEW_SAMPLERS                                                                                                                      \
-	{                                                                                                                                  \
-		"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "field_coarse", "field_detail",              \
-			"height_table", "height_maximum", "phase_table", "forward_peak_table", "forward_blur_table", "slab_sun_table",     \
-			"slab_view_table", "ground_received", "cloud_received"                                                             \
-	}
+/* OpenGL grants 16 samplers; each side leaves some out. */
+#define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "ground_relief"
+#define CLOUD_SAMPLERS                                                                                                                     \
+	"field_coarse", "field_detail", "phase_table", "slab_sun_table", "slab_view_table", "ground_received", "cloud_received"
 
-static const struct pass_desc one_desc = {
-	.file = "shaders/passes/view.glsl", .defines = "#define OUTPUTS 1\n", .outputs = 1, .samplers = VIEW_SAMPLERS};
-static const struct pass_desc four_desc = {
-	.file = "shaders/passes/view.glsl", .defines = "#define OUTPUTS 4\n", .outputs = VIEW_OUTPUTS, .samplers = VIEW_SAMPLERS};
+static const struct {
+	const char *defines;
+	const char *samplers[PASS_SAMPLERS_MAX];
+} sides[VIEW_SIDES] = {
+	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
+	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n",
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "forward_peak_table", "forward_blur_table"}},
+	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_table", "height_maximum"}},
+};
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
+
+static struct pass *create_pass(const struct pass_compiler *compiler, enum view_side side, enum view_region region, int outputs)
+{
+	char defines[160];
+	struct pass_desc desc = {.file = "shaders/passes/view.glsl", .defines = defines, .outputs = outputs};
+	snprintf(defines, sizeof defines, "%s#define VIEW_REGION %d\n#define OUTPUTS %d\n", sides[side].defines, region, outputs);
+	memcpy(desc.samplers, sides[side].samplers, sizeof desc.samplers);
+	return pass_create(compiler, &desc);
+}
 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
-	stage->one = pass_create(compiler, &one_desc);
-	stage->four = stage->one ? pass_create(compiler, &four_desc) : NULL;
-	stage->develop = stage->four ? pass_create(compiler, &develop_desc) : NULL;
-	if (!stage->develop) {
-		view_stage_finish(stage);
-		return false;
+	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
+	for (int side = 0; ok && side < VIEW_SIDES; side++) {
+		for (int region = 0; ok && region < VIEW_REGIONS; region++)
+			ok = (stage->passes[side][region] = create_pass(compiler, side, region, 1)) != NULL;
+		ok = ok && (stage->several[side] = create_pass(compiler, side, VIEW_MIXED, VIEW_OUTPUTS)) != NULL;
 	}
-	return true;
+	if (!ok)
+		view_stage_finish(stage);
+	return ok;
 }
 
 void view_stage_finish(struct view_stage *stage)
 {
+	for (int side = 0; side < VIEW_SIDES; side++) {
+		pass_destroy(stage->several[side]);
+		for (int region = 0; region < VIEW_REGIONS; region++)
+			pass_destroy(stage->passes[side][region]);
+	}
 	pass_destroy(stage->develop);
-	pass_destroy(stage->four);
-	pass_destroy(stage->one);
 	*stage = (struct view_stage){0};
 }
 
@@ -74,14 +93,8 @@ static void fill_camera(struct scene_block *block, const struct scene *scene)
 
 void view_fill_block(struct scene_block *block, const struct scene *scene)
 {
-	const struct scene_ground *ground = &scene->ground;
-	const bool lambert = ground->type == GROUND_LAMBERT;
 	double matrix[3][3];
 	fill_camera(block, scene);
-	set4(block->ground_albedo, ground->albedo_scale * (lambert ? ground->albedo[0] : 1),
-	     ground->albedo_scale * (lambert ? ground->albedo[1] : 1), ground->albedo_scale * (lambert ? ground->albedo[2] : 1),
-	     ground->type);
-	block->ground_mean_albedo[3] = (float)scene->clouds.tile_m;
 	colour_band_matrix(matrix);
 	set4(block->band_red, matrix[0][0], matrix[1][0], matrix[2][0], 0);
 	set4(block->band_green, matrix[0][1], matrix[1][1], matrix[2][1], 0);
@@ -155,26 +168,85 @@ static struct texture *picture_create(const struct scene *scene)
 	return picture;
 }
 
-static void bind_inputs(struct pass_run *run, const struct view_inputs *in)
+static enum view_side side_of(const struct scene *scene, const struct view_inputs *in)
 {
-	const struct texture *samplers[PASS_SAMPLERS_MAX] = {in->sky->transmittance,
-							     in->sky->total,
-							     in->sky->near,
-							     in->sky->to_layer,
-							     in->sky->to_end,
-							     in->field->coarse,
-							     in->field->detail,
-							     in->field->height,
-							     in->field->maximum,
-							     &in->droplets->phase,
-							     &in->droplets->forward_peak,
-							     &in->droplets->forward_blur,
-							     &in->slab->sun,
-							     &in->slab->view,
-							     in->light ? in->light->ground_received : NULL,
-							     in->light ? in->light->cloud_received : NULL};
-	for (int i = 0; i < PASS_SAMPLERS_MAX; i++)
-		run->samplers[i] = samplers[i];
+	if (!in->light)
+		return VIEW_CLEAR;
+	return scene->camera.position_m[2] < scene->clouds.base_m ? VIEW_BELOW : VIEW_ABOVE;
+}
+
+/* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
+static void bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
+{
+	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,      in->sky->to_layer,
+					  in->sky->to_end,        in->ground->map, in->ground->relief, NULL};
+	int n = 0;
+	for (; common[n]; n++)
+		run->samplers[n] = common[n];
+	if (side == VIEW_CLEAR)
+		return;
+	const struct texture *clouds[] = {in->field->coarse,
+					  in->field->detail,
+					  &in->droplets->phase,
+					  &in->slab->sun,
+					  &in->slab->view,
+					  in->light->ground_received,
+					  in->light->cloud_received,
+					  side == VIEW_ABOVE ? in->field->height : &in->droplets->forward_peak,
+					  side == VIEW_ABOVE ? in->field->maximum : &in->droplets->forward_blur,
+					  NULL};
+	for (int i = 0; clouds[i]; i++)
+		run->samplers[n++] = clouds[i];
+}
+
+/* What the rays of a row of pixels have in common. The sine of the elevation along a row rises and falls at most once, so its ends, its
+ * middle and the point nearest to the vertical plane bound it; a margin of two pixels covers the rest. */
+static enum view_region region_of_row(const struct scene_block *block, int row)
+{
+	enum { PROBES = 16 };
+	const double h = block->camera_position[2], radius = 6371000.0;
+	const double horizon = -sqrt(h * (2 * radius + h)) / (radius + h), margin = 2 * block->camera_position[3] + 1e-6;
+	const double y = 1 - 2 * (row + 0.5) * block->image_size[3];
+	double lowest = 1, highest = -1;
+	for (int i = 0; i <= PROBES; i++) {
+		const double x = 2.0 * i / PROBES - 1;
+		double d[3], length = 0;
+		for (int k = 0; k < 3; k++) {
+			d[k] = block->camera_forward[k] + x * block->camera_right[3] * block->camera_right[k] +
+			       y * block->camera_up[3] * block->camera_up[k];
+			length += d[k] * d[k];
+		}
+		lowest = fmin(lowest, d[2] / sqrt(length));
+		highest = fmax(highest, d[2] / sqrt(length));
+	}
+	/* Between probes a wide row can bulge beyond them by the square of their distance. */
+	const double bulge = pow(block->camera_right[3] / PROBES, 2);
+	if (lowest - bulge > horizon + margin)
+		return VIEW_SKY;
+	return highest + bulge < horizon - margin ? VIEW_GROUND : VIEW_MIXED;
+}
+
+/* From above, rays that miss the ground but graze the layer belong to neither region. */
+static enum view_region region_for(enum view_side side, enum view_region region)
+{
+	return side == VIEW_ABOVE && region == VIEW_SKY ? VIEW_MIXED : region;
+}
+
+/* Runs over rows of one kind after the other, each with the program made for it. */
+static void run_regions(const struct view_stage *stage, const struct stage_context *context, enum view_side side, struct pass_run *run)
+{
+	const int height = run->targets[0]->height;
+	run->width = run->targets[0]->width;
+	for (int first = 0; first < height;) {
+		const enum view_region region = region_of_row(&context->block, first);
+		int end = first + 1;
+		while (end < height && region_of_row(&context->block, end) == region)
+			end++;
+		run->first_row = first;
+		run->height = end - first;
+		pass_run(stage->passes[side][region_for(side, region)], run);
+		first = end;
+	}
 }
 
 /* Renders `count` layers (1 or VIEW_OUTPUTS) in one pass and hands them to the cache. */
@@ -183,14 +255,18 @@ static bool run_group(const struct view_stage *stage, struct stage_context *cont
 {
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	bind_inputs(&run, inputs);
+	const enum view_side side = side_of(scene, inputs);
+	bind_inputs(&run, side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
 		targets[i] = picture_create(scene);
 		if (!targets[i])
 			goto fail;
 	}
-	pass_run(count == 1 ? stage->one : stage->four, &run);
+	if (count == 1)
+		run_regions(stage, context, side, &run);
+	else
+		pass_run(stage->several[side], &run);
 	for (int i = 0; i < count; i++) {
 		const struct cache_key key = make_key(scene, layers[i]);
 		struct texture *picture = targets[i];

@@ -7,14 +7,23 @@
 
 #include "renderer/stages/radiosity.h"
 
+/* The view pass exists with one output, for each part of the picture, and with several for the whole. */
 enum { VIEW_OUTPUTS = 4 };
 
+/* Where the camera is. */
+enum view_side { VIEW_CLEAR, VIEW_BELOW, VIEW_ABOVE, VIEW_SIDES };
+
+/* Rows of the picture: rays of either kind, all to the ground, none to the ground. The numbers stand in shaders/lib/view.glsl. */
+enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
+
 struct view_stage {
-	struct pass *one, *four; /* the view pass with one output, and with VIEW_OUTPUTS */
+	struct pass *passes[VIEW_SIDES][VIEW_REGIONS]; /* one output */
+	struct pass *several[VIEW_SIDES];              /* VIEW_OUTPUTS outputs */
 	struct pass *develop;
 };
 
 struct view_inputs {
+	const struct ground_maps *ground;
 	const struct droplets *droplets;
 	const struct slab_tables *slab;
 	const struct sky_tables *sky;

@@ -12,9 +12,10 @@ uint noise_hash(uint x)
 	return x;
 }
 
+// Of a lattice point: the odd constants (Weyl sequences) keep neighbours apart before the one full mixing.
 uint noise_hash2(int x, int y, uint seed)
 {
-	return noise_hash(uint(x) + noise_hash(uint(y) + noise_hash(seed)));
+	return noise_hash(uint(x) * 0x9e3779b1u + uint(y) * 0x85ebca77u + seed * 0xc2b2ae3du);
 }
 
 // 0..1
@@ -33,8 +34,9 @@ int noise_wrap(int i, int period)
 float noise_corner(int x, int y, int period, uint seed, float turns, vec2 offset)
 {
 	uint h = noise_hash2(noise_wrap(x, period), noise_wrap(y, period), seed);
-	float speed = noise_unit(h) < 0.5 ? -1.0 : 1.0;
-	float angle = 2.0 * PI * (noise_unit(noise_hash(h)) + speed * (0.6 + 0.8 * noise_unit(noise_hash(h + 7u))) * turns);
+	// Upper bits say where the gradient starts, lower ones which way and how fast it turns.
+	float speed = (float(h & 127u) * (0.8 / 127.0) + 0.6) * ((h & 128u) == 0u ? -1.0 : 1.0);
+	float angle = 2.0 * PI * (noise_unit(h) + speed * turns);
 	return dot(vec2(cos(angle), sin(angle)), offset);
 }
 

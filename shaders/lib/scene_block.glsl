@@ -2,12 +2,14 @@
 #ifndef __cplusplus
 layout(std140, binding = 0) uniform scene_block {
 	vec4 sun_direction;
+	vec4 sun_at_camera;
 	vec4 solar_irradiance;
 	vec4 rayleigh;
 	vec4 aerosol;
 	vec4 aerosol_shape;
 	vec4 ozone;
 	vec4 ground_albedo;
+	vec4 ground_patch;
 	vec4 ground_mean_albedo;
 	vec4 camera_position;
 	vec4 camera_right;

@@ -4,34 +4,31 @@
 
 const vec2 SKY_TABLE_SIZE = vec2(96.0, 160.0);
 
-// Elevation of the horizon in radians, not positive.
-float sky_table_horizon()
-{
-	return asin(sphere_horizon(camera_position.z));
-}
-
+// Rows: square root of the sine of the elevation, counted from the horizon's; columns: square root of sin(azimuth/2). No inverse trigonometry is
+// needed to look a direction up.
 vec2 sky_table_coordinates(vec3 direction)
 {
 	float rows = 0.5 * SKY_TABLE_SIZE.y;
-	float horizon = sky_table_horizon();
-	float e = asin(clamp(direction.z, -1.0, 1.0)) - horizon;
-	float unit = sqrt(clamp(e > 0.0 ? e / (0.5 * PI - horizon) : -e / (0.5 * PI + horizon), 0.0, 1.0));
+	float horizon = sphere_horizon(camera_position.z);
+	float rise = direction.z - horizon;
+	float unit = sqrt(clamp(rise > 0.0 ? rise / (1.0 - horizon) : -rise / (1.0 + horizon), 0.0, 1.0));
 	float row = 0.5 + unit * (rows - 1.0);
 	vec2 flat_direction = vec2(direction.x, direction.y);
-	float cosine = dot(flat_direction, vec2(sun_direction.x, sun_direction.y)) /
-	               max(length(flat_direction) * length(vec2(sun_direction.x, sun_direction.y)), 1e-9);
-	float column = sqrt(acos(clamp(cosine, -1.0, 1.0)) / PI);
-	return vec2((0.5 + column * (SKY_TABLE_SIZE.x - 1.0)) / SKY_TABLE_SIZE.x, (e > 0.0 ? row : rows + row) / SKY_TABLE_SIZE.y);
+	vec2 flat_sun = vec2(sun_direction.x, sun_direction.y);
+	float cosine = dot(flat_direction, flat_sun) * inversesqrt(max(dot(flat_direction, flat_direction) * dot(flat_sun, flat_sun), 1e-18));
+	float column = sqrt(sqrt(clamp(0.5 - 0.5 * cosine, 0.0, 1.0)));
+	return vec2((0.5 + column * (SKY_TABLE_SIZE.x - 1.0)) / SKY_TABLE_SIZE.x, (rise > 0.0 ? row : rows + row) / SKY_TABLE_SIZE.y);
 }
 
-// The inverse, for the centre of a texel: x elevation, y azimuth from the sun, radians.
-vec2 sky_table_angles(ivec2 pixel)
+// The inverse, for the centre of a texel: x sine of the elevation, y cosine of the azimuth from the sun.
+vec2 sky_table_parameters(ivec2 pixel)
 {
 	float rows = 0.5 * SKY_TABLE_SIZE.y;
-	float horizon = sky_table_horizon();
+	float horizon = sphere_horizon(camera_position.z);
 	float column = float(pixel.x) / (SKY_TABLE_SIZE.x - 1.0);
 	bool above = float(pixel.y) < rows;
 	float unit = (above ? float(pixel.y) : float(pixel.y) - rows) / (rows - 1.0);
-	float e = above ? horizon + unit * unit * (0.5 * PI - horizon) : horizon - unit * unit * (0.5 * PI + horizon);
-	return vec2(e, PI * column * column);
+	float mu = above ? horizon + unit * unit * (1.0 - horizon) : horizon - unit * unit * (1.0 + horizon);
+	float half_sine = column * column;
+	return vec2(clamp(mu, -1.0, 1.0), 1.0 - 2.0 * half_sine * half_sine);
 }

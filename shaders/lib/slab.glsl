@@ -39,26 +39,16 @@ vec3 slab_sun_row(float thickness, float row)
 	return vec3(textureLod(slab_sun_table, vec2((0.5 + unit * (SLAB_SUN_WIDTH - 1.0)) / SLAB_SUN_WIDTH, (row + 0.5) / SLAB_SUN_ROWS), 0.0));
 }
 
-// Fractions of the sun's flux on the slab: scattered three times and oftener, transmitted and reflected.
-vec3 slab_multiple_transmitted(float thickness)
+// Fraction of the sun's flux on the slab that leaves it, scattered three times and oftener, through the other side or back.
+vec3 slab_multiple(float thickness, bool through)
 {
-	return slab_sun_row(thickness, 0.0);
+	return slab_sun_row(thickness, through ? 0.0 : 2.0);
 }
 
-vec3 slab_multiple_reflected(float thickness)
+// Factor that gives double scattering, of single scattering's shape and P_2, its flux T_2 or R_2.
+vec3 slab_double_scale(float thickness, bool through)
 {
-	return slab_sun_row(thickness, 2.0);
-}
-
-// Factors that give double scattering, of single scattering's shape and P_2, its flux T_2 or R_2.
-vec3 slab_double_transmitted_scale(float thickness)
-{
-	return slab_sun_row(thickness, 1.0);
-}
-
-vec3 slab_double_reflected_scale(float thickness)
-{
-	return slab_sun_row(thickness, 3.0);
+	return slab_sun_row(thickness, through ? 1.0 : 3.0);
 }
 
 // T_0 + T_1 + T_2, what goes on nearly along the beam.

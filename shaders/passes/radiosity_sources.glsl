@@ -26,12 +26,12 @@ void pass(ivec2 pixel)
 			vec2 place = (vec2(pixel) + (vec2(float(x), float(y)) + 0.5) / float(SAMPLES)) * texel;
 			float thickness = field_thickness(place, texel / float(SAMPLES));
 			float above = field_thickness(place + parallax, texel / float(SAMPLES));
-			vec3 back = cloud_layer.w < 0.5 ? vec3(0.0) : slab_spherical_albedo(thickness);
-			source += (cloud_layer.w < 0.5 ? vec3(0.0) : slab_multiple_transmitted(thickness)) * sun_at_cloud +
+			vec3 back = slab_spherical_albedo(thickness);
+			source += slab_multiple(thickness, true) * sun_at_cloud +
 			          (vec3(1.0) - back) * vec3(sky_irradiance_cloud);
 			albedo += back;
 			reflectance += ground_reflectance(place, texel / float(SAMPLES));
-			direct += (cloud_layer.w < 0.5 ? vec3(1.0) : slab_directional_transmittance(above)) * sun_at_ground;
+			direct += slab_directional_transmittance(above) * sun_at_ground;
 		}
 	}
 	float scale = 1.0 / float(SAMPLES * SAMPLES);

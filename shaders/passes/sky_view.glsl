@@ -1,6 +1,7 @@
 // The sky from the camera's height, over directions relative to the sun:
 // 0 light of the air along the whole ray (to the ground or out of the atmosphere), 1 the part of it before the cloud layer,
-// 2 transmittance of the air to the layer (to the ray's end when it meets none), 3 to the ray's end.
+// 2 transmittance of the air to the layer (to the ray's end when it meets none); 3 on rays that end on the ground, transmittance to it; on others, irradiance of
+// the layer by the sun where they meet it, through the air to the camera.
 #include "shaders/lib/scattering.glsl"
 #include "shaders/lib/sky_table.glsl"
 
@@ -19,11 +20,11 @@ float layer_distance(float h, float mu, float to_ground)
 
 void pass(ivec2 pixel)
 {
-	vec2 angles = sky_table_angles(pixel);
+	vec2 parameters = sky_table_parameters(pixel);
 	float h = camera_position.z;
-	float mu = sin(angles.x);
+	float mu = parameters.x;
 	float mu_sun = sun_direction.z;
-	float cos_angle = mu * mu_sun + cos(angles.x) * sqrt(max(0.0, 1.0 - mu_sun * mu_sun)) * cos(angles.y);
+	float cos_angle = mu * mu_sun + sqrt(max(0.0, 1.0 - mu * mu)) * sqrt(max(0.0, 1.0 - mu_sun * mu_sun)) * parameters.y;
 
 	// Rows below the horizon meet the ground even where rounding says they just miss it.
 	bool below = float(pixel.y) >= 0.5 * SKY_TABLE_SIZE.y;
@@ -42,5 +43,8 @@ void pass(ivec2 pixel)
 	STORE(0, vec4(light.radiance, 1.0));
 	STORE(1, vec4(near_light.radiance, 1.0));
 	STORE(2, vec4(near_light.transmittance, 1.0));
-	STORE(3, vec4(light.transmittance, 1.0));
+	float height = cloud_layer.x + cloud_layer.y;
+	float mu_layer = clamp((mu_sun * (EARTH_RADIUS + h) + split * cos_angle) / (EARTH_RADIUS + cloud_layer.x), -1.0, 1.0);
+	vec3 sunlight = sun_irradiance(mu_layer > 0.0 ? height : cloud_layer.x, mu_layer) * near_light.transmittance;
+	STORE(3, vec4(below ? light.transmittance : sunlight, 1.0));
 }

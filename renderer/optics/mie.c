@@ -36,7 +36,7 @@ static void log_derivatives(double z, double *derivative, int start)
 static double complex unit_fraction(double p, double q)
 {
 	double scale = p / (p * p + q * q);
-	return CMPLX(p * scale, -q * scale);
+	return p * scale - q * scale * I;
 }
 
 void mie_terms(double x, double m, struct mie_term *terms, double *scratch)

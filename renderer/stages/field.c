@@ -29,7 +29,7 @@ static const struct {
 	double overcast_lift; /* share of the range by which the threshold sinks below all densities as coverage reaches 1 */
 } shapes[CLOUD_TYPE_COUNT] = {
 	[CLOUD_STRATUS] = {0.45, 0.045, 1.2},
-	[CLOUD_STRATOCUMULUS] = {0.8, 0.075, 0.12},
+	[CLOUD_STRATOCUMULUS] = {1.15, 0.10, 0.12},
 };
 
 /* Detail repeats after about this length (the tile divided by a whole number), in m. */

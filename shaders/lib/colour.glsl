@@ -7,11 +7,16 @@ vec3 colour_of_bands(vec3 bands)
 	return vec3(band_red) * bands.x + vec3(band_green) * bands.y + vec3(band_blue) * bands.z;
 }
 
-// The filmic curve, a channel at a time: a straight part through the shadows and middle greys, then a shoulder that reaches 1 only at infinity,
-// (x + a x^2) / (1 + b x + a x^2). Slope 1 at the origin times the exposure.
+// Film for daylight takes sunlight of 5500 K for white, while Rec.709 is white at 6500 K: factors that bring D55 two thirds of the way to D65. Pictures in files of
+// scene light (EXR), and the linear tone, stay colorimetric.
+const vec3 COLOUR_FILM_BALANCE = vec3(0.937, 1.008, 1.138);
+
+// The filmic curve, a channel at a time: 1 - (1 + a x^c / n)^-n. The exponent c makes shadows and middle greys a little steeper than linear, as film is; n sets how long the
+// shoulder is: the larger, the sooner white. Middle grey 0.18 comes out at 0.15, twice white (2.0) at 0.79, and white itself only at infinity.
 float colour_filmic(float x)
 {
-	return x * (1.35 + 1.9 * x) / (1.0 + x * (1.75 + 1.9 * x));
+	float y = 1.0 + (1.25 / 1.5) * pow(x, 1.15);
+	return 1.0 - 1.0 / (y * sqrt(y));
 }
 
 // Rec.709 colours outside the gamut are drawn to grey until no channel is negative, which keeps their luminance.

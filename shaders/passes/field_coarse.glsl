@@ -24,7 +24,7 @@ float field_stratocumulus(vec2 p, uint seed, float t)
 	float cells_small = noise_cells(p * float(small) + 0.66 * warp, small, seed + 6u, t / 1100.0, 0.8);
 	float turbulence = noise_turbulence(p - drift, field_period(2500.0), field_octaves(2500.0), seed + 21u, t / 1500.0);
 	float meso = noise_turbulence(p, field_period(10000.0), 3, seed + 22u, t / 7000.0);
-	return 0.9 * cells + 0.35 * cells_small + 0.24 * turbulence + 0.32 * meso;
+	return 0.75 * cells + 0.45 * cells_small + 0.30 * turbulence + 0.36 * meso;
 }
 
 // A grey sheet: long soft rolls and mesoscale variation, little convection.

@@ -21,10 +21,7 @@ static void *on_target(void *context, const char *target, struct MHD_Connection 
 {
 	struct service *service = context;
 	(void)connection;
-	struct request *request = request_create(service, target);
-	if (request)
-		service->in_flight++;
-	return request;
+	return request_create(service, target);
 }
 
 static bool allows(const struct route *route, const char *method)
@@ -91,6 +88,10 @@ static enum MHD_Result on_access(void *context, struct MHD_Connection *connectio
 		*size = 0;
 		return result;
 	}
+	/* Whole now: from here on a shutdown waits for its answer. */
+	if (!request->is_accepted)
+		request->service->in_flight++;
+	request->is_accepted = true;
 	return request->next(request);
 }
 
@@ -111,9 +112,10 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 		 : request->is_head ? "HEAD"
 				    : "GET",
 		 request->path, status, took, request->id);
+	if (request->is_accepted)
+		service->in_flight--;
 	request_destroy(request);
 	*state = NULL;
-	service->in_flight--;
 }
 
 static void on_library_log(void *context, const char *format, va_list args)
@@ -168,12 +170,11 @@ static struct MHD_Daemon *start_daemon(struct service *service, const struct add
 	unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG;
 	if (address->ai_family == AF_INET6)
 		flags |= MHD_USE_IPv6;
-	return MHD_start_daemon(flags, 0, NULL, NULL, on_access, service, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, NULL,
-				MHD_OPTION_SOCK_ADDR, address->ai_addr, MHD_OPTION_LISTENING_ADDRESS_REUSE, 1u, MHD_OPTION_URI_LOG_CALLBACK,
-				on_target, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed, service, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-				(size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT, (unsigned)CONNECTIONS_MAX,
-				MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_SECONDS, MHD_OPTION_THREAD_POOL_SIZE, (unsigned)HTTP_THREADS,
-				MHD_OPTION_END);
+	return MHD_start_daemon(
+		flags, 0, NULL, NULL, on_access, service, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, NULL, MHD_OPTION_SOCK_ADDR,
+		address->ai_addr, MHD_OPTION_URI_LOG_CALLBACK, on_target, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed, service,
+		MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT, (unsigned)CONNECTIONS_MAX,
+		MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_SECONDS, MHD_OPTION_THREAD_POOL_SIZE, (unsigned)HTTP_THREADS, MHD_OPTION_END);
 }
 
 bool http_start(struct service *service)

@@ -165,7 +165,7 @@ static void write_queue(struct text *text, const struct metrics *metrics, const 
 	text_printf(text, "stratus_queue_depth %zu\n", now->queue_depth);
 	write_family(text, "queue_limit", "gauge", "Renders that may wait.");
 	text_printf(text, "stratus_queue_limit %zu\n", now->queue_limit);
-	write_family(text, "requests_in_flight", "gauge", "Requests begun and not ended, this one included.");
+	write_family(text, "requests_in_flight", "gauge", "Requests being answered, this one included.");
 	text_printf(text, "stratus_requests_in_flight %zu\n", now->requests_in_flight);
 	write_family(text, "queue_rejected", "counter", "Work refused, by reason.");
 	for (int i = 0; i < REJECTION_COUNT; i++)

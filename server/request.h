@@ -36,6 +36,7 @@ struct request {
 	const char *query;                 /* as sent, behind the question mark; NULL: none */
 	const char *method;                /* libmicrohttpd's, valid during its callbacks */
 	bool is_post, is_head;
+	bool is_accepted; /* read to its end: counted in service->in_flight */
 	double started_ms;
 	char id[REQUEST_ID_SIZE];
 	const struct route *route;

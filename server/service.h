@@ -34,7 +34,7 @@ struct service {
 	unsigned port;
 	int listening_socket; /* taken from libmicrohttpd while stopping; else negative */
 
-	_Atomic size_t in_flight; /* requests begun and not ended */
+	_Atomic size_t in_flight; /* requests read to their end and not answered to theirs */
 	_Atomic size_t suspended; /* those of them that others work for */
 	_Atomic bool ready;       /* has been ready to render */
 	_Atomic bool stopping;    /* takes no new work */

@@ -1,0 +1,168 @@
+"""Overload, shutdown, settings: daemons of their own."""
+import concurrent.futures
+import http.client
+import json
+import os
+import signal
+import socket
+import subprocess
+import time
+
+import pytest
+
+from conftest import BUILD, wait_for
+
+LARGE = {"width": 2048, "height": 1536}
+
+
+def test_full_queue(start_daemon):
+    daemon = start_daemon("--queue-length", "1")
+    scenes = [{"clouds": {"seed": i}, "output": LARGE} for i in range(8)]
+    with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
+        answers = list(pool.map(daemon.render, scenes))
+    assert {a.status for a in answers} == {200, 503}
+    refused = [a for a in answers if a.status == 503]
+    for answer in refused:
+        assert answer.json["type"] == "urn:stratus:problem:queue-full"
+        assert int(answer.headers["Retry-After"]) >= 1
+        assert answer.json["retry_after_seconds"] == int(answer.headers["Retry-After"])
+        assert answer.headers["Cache-Control"] == "no-store"
+    assert daemon.metric('stratus_queue_rejected_total{reason="full"}') == len(refused)
+    assert daemon.metric("stratus_queue_depth") == 0
+
+
+def test_probes_answer_while_rendering(start_daemon):
+    daemon = start_daemon("--queue-length", "16")
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        running = [pool.submit(daemon.render, {"clouds": {"seed": i}, "output": LARGE}) for i in range(4)]
+        start = time.monotonic()
+        while not all(r.done() for r in running) and time.monotonic() - start < 2:
+            before = time.monotonic()
+            assert daemon.get("/healthz").status == 200
+            assert daemon.get("/readyz").status == 200
+            assert time.monotonic() - before < 1
+    assert all(r.result().status == 200 for r in running)
+
+
+def test_shutdown_finishes_accepted_work(start_daemon):
+    daemon = start_daemon()
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        running = [pool.submit(daemon.render, {"clouds": {"seed": i}, "output": LARGE}) for i in range(4)]
+        sample = 'stratus_requests_in_flight'
+        assert wait_for(lambda: daemon.metric(sample) >= 5 or any(r.done() for r in running))
+        daemon.process.send_signal(signal.SIGTERM)
+        assert all(r.result().status == 200 for r in running)
+    assert daemon.process.wait(timeout=60) == 0
+    with pytest.raises(ConnectionError):
+        daemon.get("/healthz")
+
+
+def test_shutdown_when_idle_is_quick(start_daemon):
+    daemon = start_daemon()
+    idle = daemon.connect()
+    idle.request("GET", "/healthz")
+    idle.getresponse().read()
+    daemon.process.send_signal(signal.SIGINT)
+    assert daemon.process.wait(timeout=30) == 0
+    idle.close()
+
+
+def test_clients_that_leave(start_daemon):
+    """Their renders are dropped, and the daemon goes on."""
+    daemon = start_daemon("--queue-length", "32")
+    body = json.dumps({"output": LARGE}).encode()
+    head = b"POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body)
+    for _ in range(12):
+        client = socket.create_connection(("127.0.0.1", daemon.port))
+        client.sendall(head + body)
+        client.close()
+    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 1, 120)
+    assert daemon.metric('stratus_renders_ended_total{reason="abandoned"}') >= 1
+    assert daemon.render({"output": {"width": 32, "height": 32}}).status == 200
+
+
+def run(*flags, **environment):
+    return subprocess.run(
+        [str(BUILD / "stratusd"), *flags], env={**os.environ, **environment}, capture_output=True, text=True, timeout=120
+    )
+
+
+@pytest.mark.parametrize(
+    "flags",
+    [
+        ["--nonsense"],
+        ["--listen"],
+        ["--queue-length", "0"],
+        ["--queue-length", "many"],
+        ["--pass", "quick"],
+        ["--log-level=loud"],
+        ["--device", "1e3"],
+        ["--workers=-1"],
+        ["stray"],
+    ],
+)
+def test_bad_flags(flags):
+    result = run(*flags)
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert flags[0].split("=")[0] in result.stderr
+
+
+def test_bad_environment():
+    result = run(STRATUS_QUEUE_LENGTH="x")
+    assert result.returncode == 2
+    assert "STRATUS_QUEUE_LENGTH" in result.stderr
+
+
+def test_settings_are_printed():
+    result = run("--print-config", "--queue-length=7", STRATUS_QUEUE_LENGTH="5", STRATUS_WORKERS="3", XDG_STATE_HOME="/tmp/x")
+    settings = dict(line.split("=", 1) for line in result.stdout.splitlines())
+    assert result.returncode == 0
+    assert settings["STRATUS_QUEUE_LENGTH"] == "7"
+    assert settings["STRATUS_WORKERS"] == "3"
+    assert settings["STRATUS_STATE_DIR"] == "/tmp/x/stratus"
+
+
+def test_help_and_version():
+    text = run("--help").stdout
+    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb log-level".split():
+        assert "--" + flag in text and "STRATUS_" + flag.upper().replace("-", "_") in text
+    assert run("--version").stdout.startswith("stratus ")
+
+
+def test_address_in_use(start_daemon, tmp_path):
+    daemon = start_daemon()
+    result = run("--listen", f"127.0.0.1:{daemon.port}", "--state-dir", str(tmp_path), STRATUS_KERNEL=str(BUILD / "mie.kernel"))
+    assert result.returncode == 1
+    assert "--listen" in result.stderr
+
+
+def test_bad_address(tmp_path):
+    for listen in ("nowhere", "127.0.0.1:", "1.2.3.4.5:80", "::1:80"):
+        assert run("--listen", listen, "--state-dir", str(tmp_path)).returncode == 1
+
+
+def test_ipv6(tmp_path):
+    if not socket.has_ipv6:
+        pytest.skip("no IPv6 here")
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        pytest.skip("no IPv6 here")
+    from conftest import KERNEL
+
+    process = subprocess.Popen(
+        [str(BUILD / "stratusd"), "--listen", "[::1]:0", "--state-dir", str(tmp_path), "--kernel", str(KERNEL)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    line = process.stdout.readline()
+    assert line.startswith("stratusd listening on http://[::1]:")
+    connection = http.client.HTTPConnection("::1", int(line.rsplit(":", 1)[1]), timeout=60)
+    connection.request("GET", "/healthz")
+    assert connection.getresponse().status == 200
+    connection.close()
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(timeout=60) == 0
+    process.stdout.close()

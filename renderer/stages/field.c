@@ -28,7 +28,7 @@ static const struct {
 	double detail_weight; /* of the detail below the texel */
 	double overcast_lift; /* share of the range by which the threshold sinks below all densities as coverage reaches 1 */
 } shapes[CLOUD_TYPE_COUNT] = {
-	[CLOUD_STRATUS] = {0.45, 0.045, 1.2},
+	[CLOUD_STRATUS] = {0.6, 0.05, 0.5},
 	[CLOUD_STRATOCUMULUS] = {1.15, 0.10, 0.12},
 };
 

@@ -25,17 +25,26 @@ float height_intersect(vec3 direction, float from, float to, float pixel_angle)
 	vec2 origin = vec2(camera_position) - vec2(cloud_drift.x, cloud_drift.y);
 	vec2 flat_direction = vec2(direction);
 	float speed = max(length(flat_direction), 1e-4);
+	// A ray that meets the layer at a slant sees a long strip of it in one pixel.
+	float spread = pixel_angle * inversesqrt(clamp(-direction.z, 0.02, 1.0));
+	// Steps short enough that a steep ray does not pass the layer in one.
+	float longest = (to - from) * (1.0 / 24.0);
 	float t = from;
 	float level = 5.0;
 	float previous_gap = 0.0;
 	float previous_t = from;
 	for (int i = 0; i < HEIGHT_ITERATIONS; i++) {
-		if (t >= to)
-			return -1.0;
-		float finest = max(0.0, log2(max(pixel_angle * t / texel, 1e-6)));
+		if (t >= to) {
+			// Out through the top again, or at the base: there the ray came down through cloud if there is any above this point.
+			if (sphere_height(camera_position.z, direction.z, to) > cloud_layer.x + 1.0)
+				return -1.0;
+			float over = textureLod(height_table, (origin + flat_direction * to) / cloud_layer.z, log2(max(spread * to / texel, 1.0))).x;
+			return over > 1.0 ? to : -1.0;
+		}
+		float finest = log2(max(spread * t / texel, 1.0));
 		float z = sphere_height(camera_position.z, direction.z, t) - cloud_layer.x;
 		vec2 uv = (origin + flat_direction * t) / cloud_layer.z;
-		if (level > 0.5) {
+		if (level > finest + 0.5) {
 			// Is the ray, until it leaves this cell, above all that the cell holds?
 			float cell = texel * exp2(level);
 			float cells = cloud_layer.z / cell;
@@ -62,19 +71,20 @@ float height_intersect(vec3 direction, float from, float to, float pixel_angle)
 			}
 			previous_gap = gap;
 			previous_t = t;
-			t += max(0.6 * texel / speed, pixel_angle * t) * (gap > 4.0 * texel ? 2.0 : 1.0);
+			t += min(0.6 * texel * exp2(finest) / speed * (gap > 4.0 * texel ? 2.0 : 1.0), longest);
 			// From time to time, try larger cells again.
 			if ((i & 3) == 3)
-				level = 2.0;
+				level = floor(finest) + 2.0;
 		}
 	}
-	return -1.0;
+	// Out of steps, which happens far away and along the tops of a closed deck.
+	return t;
 }
 
 // Upward normal of the top; differences over what a pixel covers, at least a few mean free paths, since light does not see finer relief.
 vec3 height_normal(vec2 place, float footprint)
 {
-	float e = max(1.5 * cloud_layer.z / HEIGHT_SIZE, footprint);
+	float e = max(2.5 * cloud_layer.z / HEIGHT_SIZE, footprint);
 	float dx = height_at(place + vec2(e, 0.0), e) - height_at(place - vec2(e, 0.0), e);
 	float dy = height_at(place + vec2(0.0, e), e) - height_at(place - vec2(0.0, e), e);
 	return normalize(vec3(-dx, -dy, 2.0 * e));

@@ -169,7 +169,7 @@ float view_cloud_distance(vec3 direction)
 	// A ray that only grazes the layer leaves it again as far behind its lowest point as it entered before it.
 	if (to < 0.0)
 		to = -2.0 * (EARTH_RADIUS + camera_position.z) * direction.z - from;
-	return height_intersect(direction, from >= 0.0 ? from : to, to, camera_position.w);
+	return from < 0.0 ? -1.0 : height_intersect(direction, from, to, camera_position.w);
 }
 
 // The cloud top met at distance t by a ray from above.

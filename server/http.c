@@ -19,9 +19,8 @@ enum { CONNECTION_MEMORY = 64 << 10, CONNECTIONS_MAX = 1024, IDLE_SECONDS = 30, 
 
 static void *on_target(void *context, const char *target, struct MHD_Connection *connection)
 {
-	struct service *service = context;
 	(void)connection;
-	return request_create(service, target);
+	return request_create(context, target);
 }
 
 static bool allows(const struct route *route, const char *method)
@@ -46,9 +45,9 @@ static bool announces_too_much(const struct request *request)
 static enum MHD_Result begin(struct request *request, const char *method)
 {
 	request_identify(request);
-	request->method = method;
 	request->is_post = strcmp(method, MHD_HTTP_METHOD_POST) == 0;
 	request->is_head = strcmp(method, MHD_HTTP_METHOD_HEAD) == 0;
+	snprintf(request->method, sizeof request->method, "%s", method);
 	request->route = routes_find(request->path);
 	request->next = request->route->handler;
 	if (!request->route->allow)
@@ -56,9 +55,8 @@ static enum MHD_Result begin(struct request *request, const char *method)
 	if (!allows(request->route, method))
 		return response_send_new_problem(request, PROBLEM_METHOD, "This address takes %s.", request->route->allow);
 	if (request->is_post && !negotiation_is_json(request_header(request, "Content-Type")))
-		return response_send_new_problem(
-			request, PROBLEM_MEDIA_TYPE,
-			"The body must be application/json (with curl: --json, or -H 'Content-Type: application/json').");
+		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE,
+						 "The body must be JSON, sent as Content-Type: application/json.");
 	if (announces_too_much(request))
 		return response_send_new_problem(request, PROBLEM_TOO_LARGE, "A body has at most %d bytes.", REQUEST_BODY_MAX);
 	return MHD_YES;
@@ -107,11 +105,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	enum metrics_route route = request->route ? request->route->metrics : ROUTE_OTHER;
 	bool probe = route == ROUTE_HEALTHZ || route == ROUTE_READYZ || route == ROUTE_METRICS;
 	metrics_count_request(service->metrics, route, status, took);
-	log_line(probe ? LOG_DEBUG : LOG_INFO, "%s %.200s %u %.1f ms %s",
-		 request->is_post   ? "POST"
-		 : request->is_head ? "HEAD"
-				    : "GET",
-		 request->path, status, took, request->id);
+	log_line(probe ? LOG_DEBUG : LOG_INFO, "%s %.200s %u %.1f ms %s", request->method, request->path, status, took, request->id);
 	if (request->is_accepted)
 		service->in_flight--;
 	request_destroy(request);

@@ -34,7 +34,7 @@ struct request {
 	struct MHD_Connection *connection; /* NULL until the headers are in */
 	char *path;                        /* as sent, without the query */
 	const char *query;                 /* as sent, behind the question mark; NULL: none */
-	const char *method;                /* libmicrohttpd's, valid during its callbacks */
+	char method[8];                    /* for the log, cut when longer */
 	bool is_post, is_head;
 	bool is_accepted; /* read to its end: counted in service->in_flight */
 	double started_ms;

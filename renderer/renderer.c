@@ -3,6 +3,7 @@
 #include "renderer/gl/context.h"
 #include "renderer/gl/timer.h"
 #include "renderer/log.h"
+#include "renderer/optics/paper_slab.h"
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/view.h"
@@ -181,11 +182,27 @@ static bool run_optics(struct job *job)
 	return job->slab != NULL;
 }
 
+/* What the air above gets back from below: the ground where it lies open, under clouds the deck and the ground behind it with all light
+ * between them. A deck counts with 0.6 of its largest thickness, about the mean of its field. */
+static void mean_albedo(const struct job *job, double albedo[3])
+{
+	const struct scene_clouds *clouds = &job->scene->clouds;
+	const double cover = clouds->type == CLOUD_NONE ? 0 : clouds->coverage;
+	const double t = paper_spherical_transmittance(0.6 * clouds->thickness_m * job->renderer->context.block.extinction[3]), r = 1 - t;
+	for (int band = 0; band < 3; band++) {
+		const double ground = job->ground.mean[band];
+		albedo[band] = (1 - cover) * ground + cover * (r + t * t * ground / (1 - r * ground));
+	}
+}
+
 static bool run_sky(struct job *job)
 {
+	double albedo[3];
 	struct stage_context *context = &job->renderer->context;
-	return ground_stage_run(&job->renderer->ground, context, job->scene, &job->ground) &&
-	       sky_stage_run(&job->renderer->sky, context, job->scene, job->ground.mean, &job->sky);
+	if (!ground_stage_run(&job->renderer->ground, context, job->scene, &job->ground))
+		return false;
+	mean_albedo(job, albedo);
+	return sky_stage_run(&job->renderer->sky, context, job->scene, albedo, &job->sky);
 }
 
 static bool run_field(struct job *job)
@@ -220,9 +237,10 @@ static void fill_illuminance(struct job *job)
 	job->frame->global_illuminance_lux = job->frame->direct_illuminance_lux + job->frame->diffuse_illuminance_lux;
 }
 
-/* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light whole, sunlight on the ground by
- * half, and a little of the beam itself, which a low sun sends along the ground into the sky that is looked at. A white sheet in that light comes out at 0.85 before tone;
- * most of a change of light is followed, as an eye does, but not all, so that dusk stays darker than noon. */
+/* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
+ * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is
+ * looked at. A white sheet in that light comes out at 0.85 before tone; most of a change of light is followed, as an eye does, but not all,
+ * so that dusk stays darker than noon. */
 static double exposure_of(const struct scene *scene, const struct frame *frame, double beam_lux)
 {
 	if (!scene->output.exposure_auto)

@@ -84,7 +84,10 @@ static void fill_column(float (*rows)[SLAB_SUN_WIDTH][4], int column, int band, 
 	const double kappa = optics->extinction_per_m[band];
 	const double tau_modified = kappa * (1 - optics->forward_peak_fraction[band]) * thickness;
 	const double similar = thickness * kappa / PAPER_EXTINCTION_PER_M;
-	const struct paper_orders orders = paper_orders_at(fit, similar, tau_modified / mu_l);
+	/* T_ms is similar in kappa H, the orders 1 and 2 in kappa_S H. */
+	struct paper_fit similar_fit = *fit;
+	similar_fit.kappa_c *= (1 - optics->forward_peak_fraction[band]) * PAPER_EXTINCTION_PER_M / PAPER_MODIFIED_EXTINCTION_PER_M;
+	const struct paper_orders orders = paper_orders_at(&similar_fit, similar, tau_modified / mu_l);
 	double flux_t, flux_r;
 	double_fluxes(h, tau_modified, mu_l, &flux_t, &flux_r);
 	rows[ROW_MULTIPLE_T][column][band] = (float)orders.t[3];

@@ -3,6 +3,8 @@
 // Rayleigh and aerosol fall off exponentially (8 km, 1.2 km); ozone is a tent between 10 and 40 km. The transmittance table follows Bruneton and Neyret
 // 2008, section 4; scattering of second and higher order follows Hillaire 2020 ("A Scalable and Production Ready Sky and Atmosphere Rendering
 // Technique", section 5.5): isotropic, and closed as a geometric series.
+#ifndef SHADERS_LIB_ATMOSPHERE
+#define SHADERS_LIB_ATMOSPHERE
 #include "shaders/lib/sphere.glsl"
 
 const float ATMOSPHERE_HEIGHT = 100000.0;
@@ -106,3 +108,4 @@ vec2 multiscatter_parameters(vec2 coordinates)
 	float y = table_unit(coordinates.y, MULTISCATTER_SIZE.y);
 	return vec2(y * y * ATMOSPHERE_HEIGHT, sign(x) * x * x);
 }
+#endif

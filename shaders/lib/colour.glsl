@@ -1,4 +1,6 @@
 // From the three bands to linear Rec.709, and on to what a screen shows.
+#ifndef SHADERS_LIB_COLOUR
+#define SHADERS_LIB_COLOUR
 #include "shaders/lib/noise.glsl"
 
 // Radiance in the bands (650, 550, 450 nm; W/m2/nm/sr) to linear Rec.709 with (1,1,1) = 1000 cd/m2.
@@ -43,3 +45,4 @@ vec3 colour_dither(ivec2 pixel)
 	return vec3(noise_unit(h) + noise_unit(k), noise_unit(noise_hash(k)) + noise_unit(noise_hash(h + 1u)),
 	            noise_unit(noise_hash(k + 1u)) + noise_unit(noise_hash(h + 2u))) - 1.0;
 }
+#endif

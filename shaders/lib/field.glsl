@@ -1,4 +1,6 @@
 // Thickness of the cloud layer at a place: interpolated field, detail, and only then the threshold, whose softness follows the footprint of the pixel.
+#ifndef SHADERS_LIB_FIELD
+#define SHADERS_LIB_FIELD
 #include "shaders/lib/scene_block.glsl"
 
 #ifndef __cplusplus
@@ -56,3 +58,4 @@ float field_thickness(vec2 place, float footprint)
 {
 	return cloud_layer.w < 0.5 ? 0.0 : field_thickness_of(field_density(place, footprint), footprint);
 }
+#endif

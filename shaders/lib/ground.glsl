@@ -1,4 +1,6 @@
 // Reflectance of the ground out of its painted picture (shaders/lib/ground_paint.glsl).
+#ifndef SHADERS_LIB_GROUND
+#define SHADERS_LIB_GROUND
 #include "shaders/lib/scene_block.glsl"
 
 #ifndef __cplusplus
@@ -22,3 +24,4 @@ vec3 ground_reflectance(vec2 place, float footprint)
 	float relief = textureLod(ground_relief, place / GROUND_RELIEF_TILE, lod).x + textureLod(ground_relief, place / GROUND_FINE_TILE, fine_lod).x;
 	return albedo * max(1.0 + ground_patch.y * relief, 0.25);
 }
+#endif

@@ -1,6 +1,8 @@
 // Reflectance of the ground per band (650, 550, 450 nm), painted once as a periodic picture over the tile. Broad-band means follow published surface albedos: fresh
 // snow 0.8 to 0.9 and bare sea ice 0.5 to 0.7 (Grenfell and Perovich 1984), open water 0.06 at moderate sun heights (Payne 1972), meadow
 // and crops 0.05 to 0.15 in the visible (Bowker et al. 1985).
+#ifndef SHADERS_LIB_GROUND_PAINT
+#define SHADERS_LIB_GROUND_PAINT
 #include "shaders/lib/noise.glsl"
 
 const float GROUND_SEA = 4.0;
@@ -86,3 +88,4 @@ vec3 ground_paint(vec2 p)
 		albedo = vec3(0.0);
 	return min(albedo * vec3(ground_albedo), vec3(1.0));
 }
+#endif

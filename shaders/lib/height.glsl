@@ -1,5 +1,7 @@
 // Views from above: the cloud top as a height field over the flat base, met by a ray through a pyramid of maxima (Tevs, Ihrke and Seidel 2008, "Maximum
 // Mipmaps for Fast, Accurate, and Scalable Dynamic Height Field Rendering").
+#ifndef SHADERS_LIB_HEIGHT
+#define SHADERS_LIB_HEIGHT
 #include "shaders/lib/sphere.glsl"
 
 #ifndef __cplusplus
@@ -89,3 +91,4 @@ vec3 height_normal(vec2 place, float footprint)
 	float dy = height_at(place + vec2(0.0, e), e) - height_at(place - vec2(0.0, e), e);
 	return normalize(vec3(-dx, -dy, 2.0 * e));
 }
+#endif

@@ -1,4 +1,6 @@
 // Deterministic noise on periodic lattices that lives in time instead of sliding (Perlin and Neyret 2001, "Flow Noise").
+#ifndef SHADERS_LIB_NOISE
+#define SHADERS_LIB_NOISE
 #include "shaders/lib/scene_block.glsl"
 
 // Integer hash with full avalanche (Wellons 2018, "lowbias32").
@@ -99,3 +101,4 @@ float noise_cells(vec2 p, int period, uint seed, float lives, float reach)
 	}
 	return max(0.0, 1.0 - nearest / (reach * reach));
 }
+#endif

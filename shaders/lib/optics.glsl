@@ -1,4 +1,6 @@
 // Phase functions and the light of the forward peak, out of the tables of the optics stage.
+#ifndef SHADERS_LIB_OPTICS
+#define SHADERS_LIB_OPTICS
 #include "shaders/lib/scene_block.glsl"
 
 #ifndef __cplusplus
@@ -62,3 +64,4 @@ vec3 forward_blur(vec2 half_angle, float s)
 	float x = (0.5 + phase_unit(half_angle) * (FORWARD_BLUR_SIZE.x - 1.0)) / FORWARD_BLUR_SIZE.x;
 	return vec3(textureLod(forward_blur_table, vec2(x, forward_depth(s)), 0.0));
 }
+#endif

@@ -2,6 +2,8 @@
 //
 // The kernel between them, h^2 / (pi (h^2 + d^2)^2), is a sum of smooth kernels of growing size: cubic B-splines on the levels of a mip pyramid, whose weights
 // the processor fits to the kernel's transform (renderer/stages/exchange_weights.h). They sum to 1: nothing is created or lost.
+#ifndef SHADERS_LIB_RADIOSITY
+#define SHADERS_LIB_RADIOSITY
 #include "shaders/lib/field.glsl"
 
 const int EXCHANGE_LEVELS = 8;
@@ -25,14 +27,13 @@ vec3 exchange_bicubic(sampler2D plane, vec2 uv, float level)
 	return mix(b, a, g0.y);
 }
 
-// Irradiance received at uv from the other plane's radiosity. weights: arguments[0], [1], finest level first.
+// Irradiance received at uv from the other plane's radiosity. arguments[0], [1]: weights, finest level first; [2]: the first and the last level with any weight.
 vec3 exchange_received(sampler2D plane, vec2 uv)
 {
-	vec3 sum = vec3(0.0);
-	for (int level = 0; level < EXCHANGE_LEVELS; level++) {
-		float weight = arguments[level / 4][level - level / 4 * 4];
-		if (weight > 0.0)
-			sum += weight * exchange_bicubic(plane, uv, float(level));
-	}
+	const int MEAN = EXCHANGE_LEVELS - 1; // the level of one texel
+	vec3 sum = arguments[1].w * vec3(texelFetch(plane, ivec2(0), MEAN));
+	int last = min(int(arguments[2].y), MEAN - 1);
+	for (int level = int(arguments[2].x); level <= last; level++)
+		sum += arguments[level / 4][level - level / 4 * 4] * exchange_bicubic(plane, uv, float(level));
 	return sum;
 }

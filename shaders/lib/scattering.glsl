@@ -1,4 +1,6 @@
 // Light scattered towards a point by the air along a ray.
+#ifndef SHADERS_LIB_SCATTERING
+#define SHADERS_LIB_SCATTERING
 #include "shaders/lib/sunlight.glsl"
 
 #ifndef __cplusplus
@@ -43,3 +45,4 @@ airlight scattering_walk(airlight light, float h, float mu, float mu_sun0, float
 	}
 	return light;
 }
+#endif

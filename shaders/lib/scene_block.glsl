@@ -1,4 +1,6 @@
 // The scene as uniforms; what each member is: renderer/scene_block.h.
+#ifndef SHADERS_LIB_SCENE_BLOCK
+#define SHADERS_LIB_SCENE_BLOCK
 #ifndef __cplusplus
 layout(std140, binding = 0) uniform scene_block {
 	vec4 sun_direction;
@@ -37,3 +39,4 @@ uniform vec4 arguments[4];
 
 const float PI = 3.14159265358979;
 const float EARTH_RADIUS = 6371000.0;
+#endif

@@ -1,5 +1,7 @@
 // Mapping between directions and the tables of the sky seen from the camera's height: columns over the azimuth from the sun (0..180 deg, denser at the
 // sun), rows over the elevation from the horizon, upper half above it, lower half below, both denser at the horizon.
+#ifndef SHADERS_LIB_SKY_TABLE
+#define SHADERS_LIB_SKY_TABLE
 #include "shaders/lib/sphere.glsl"
 
 const vec2 SKY_TABLE_SIZE = vec2(96.0, 160.0);
@@ -32,3 +34,4 @@ vec2 sky_table_parameters(ivec2 pixel)
 	float half_sine = column * column;
 	return vec2(clamp(mu, -1.0, 1.0), 1.0 - 2.0 * half_sine * half_sine);
 }
+#endif

@@ -1,5 +1,7 @@
 // The plane-parallel slab of Bouthors, Neyret, Lefebvre 2006, with the normalisations corrected: radiances for an irradiance of 1 on a plane normal to the
 // beam. tau is the modified (kappa_S) optical thickness along the normal, mu_l and mu_v the cosines of light and view to it, both positive.
+#ifndef SHADERS_LIB_SLAB
+#define SHADERS_LIB_SLAB
 #include "shaders/lib/optics.glsl"
 
 #ifndef __cplusplus
@@ -70,3 +72,4 @@ float slab_plane_transmittance(float thickness, float mu)
 	vec2 at = vec2(x, acos(clamp(mu, 0.0, 1.0)) / (0.5 * PI));
 	return textureLod(slab_view_table, (0.5 + at * (SLAB_VIEW_SIZE - 1.0)) / SLAB_VIEW_SIZE, 0.0).x;
 }
+#endif

@@ -1,5 +1,7 @@
 // Rays over a spherical Earth. Heights are metres above the ground and distances metres along the ray; radii of 6.4e6 m are never squared and
 // subtracted, since single precision would leave errors of metres.
+#ifndef SHADERS_LIB_SPHERE
+#define SHADERS_LIB_SPHERE
 #include "shaders/lib/scene_block.glsl"
 
 // Distance along a ray (from height h, cosine mu to the local vertical) to the sphere of height `target`: the far crossing for a target above or one
@@ -47,3 +49,4 @@ float sphere_horizon(float h)
 {
 	return -sqrt(max(h, 0.0) * (2.0 * EARTH_RADIUS + h)) / (EARTH_RADIUS + h);
 }
+#endif

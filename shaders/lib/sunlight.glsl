@@ -1,4 +1,6 @@
 // What the sun and the sky send to a point in the air, out of the tables of the sky stage.
+#ifndef SHADERS_LIB_SUNLIGHT
+#define SHADERS_LIB_SUNLIGHT
 #include "shaders/lib/atmosphere.glsl"
 
 #ifndef __cplusplus
@@ -20,3 +22,4 @@ vec3 sun_irradiance(float h, float mu)
 {
 	return vec3(solar_irradiance) * sun_transmittance(h, mu);
 }
+#endif

@@ -1,4 +1,6 @@
 // The picture: what arrives at the camera along a ray, in parts that add up to the whole. W/m2/nm/sr in the three bands.
+#ifndef SHADERS_LIB_VIEW
+#define SHADERS_LIB_VIEW
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/field.glsl"
 #include "shaders/lib/ground.glsl"
@@ -266,3 +268,4 @@ vec3 view_sum(view_parts p)
 {
 	return p.sun_direct + p.order0 + p.order1 + p.order2 + p.multiple + p.cloud_sky + p.cloud_ground + p.sky + p.ground + p.air;
 }
+#endif

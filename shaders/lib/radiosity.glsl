@@ -37,3 +37,4 @@ vec3 exchange_received(sampler2D plane, vec2 uv)
 		sum += arguments[level / 4][level - level / 4 * 4] * exchange_bicubic(plane, uv, float(level));
 	return sum;
 }
+#endif

@@ -8,14 +8,14 @@ enum { SCENE_BLOCK_BINDING = 0 };
 
 struct scene_block {
 	float sun_direction[4];         /* unit vector to the sun; angular radius in radians */
-	float sun_at_camera[4];       /* irradiance by the sun at the camera on a plane normal to the beam, W/m2/nm; - */
+	float sun_at_camera[4];         /* irradiance by the sun at the camera on a plane normal to the beam, W/m2/nm; - */
 	float solar_irradiance[4];      /* outside the atmosphere on a plane normal to the beam, W/m2/nm; - */
 	float rayleigh[4];              /* scattering coefficient at the ground, 1/m; scale height, m */
 	float aerosol[4];               /* extinction coefficient at the ground, 1/m; scale height, m */
 	float aerosol_shape[4];         /* single scattering albedo; asymmetry; -; - */
 	float ozone[4];                 /* absorption coefficient at its peak, 1/m; height of the peak, m */
 	float ground_albedo[4];         /* of lambert ground, else the scale alone; type of ground (enum ground_type) */
-	float ground_patch[4];        /* side of the ground's picture in texels; contrast of its relief; -; - */
+	float ground_patch[4];          /* side of the ground's picture in texels; contrast of its relief; -; - */
 	float ground_mean_albedo[4];    /* over the tile; tile of ground and cloud, m */
 	float camera_position[4];       /* x, y modulo the tile, z: metres above ground; distance between pixel centres, rad */
 	float camera_right[4];          /* unit; tangent of half the horizontal field of view */

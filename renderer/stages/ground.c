@@ -15,14 +15,14 @@ static const struct pass_desc pass_descs[GROUND_PASS_COUNT] = {
 /* RELIEF_SIDE as in shaders/lib/ground.glsl. */
 enum { RELIEF_SIDE = 256, UNIFORM_SIDE = 4, PICTURE_SIDE = 1024 };
 
-/* What the types differ in beside their picture. brightest: upper bound of shaders/lib/ground_paint.glsl; relief: contrast of what lies
+/* What the types differ in beside their picture. relief: contrast of what lies
  * close by. */
 static const struct {
 	bool picture;
-	double brightest, relief;
+	double relief;
 } types[GROUND_TYPE_COUNT] = {
-	[GROUND_COUNTRY] = {true, 0.21, 0.22}, [GROUND_SEA] = {false, 0.07, 0.10}, [GROUND_SEA_ICE] = {true, 0.80, 0.03},
-	[GROUND_SNOW] = {false, 0.87, 0.02},   [GROUND_BLACK] = {false, 0.0, 0.0}, [GROUND_LAMBERT] = {false, 1.0, 0.0},
+	[GROUND_COUNTRY] = {true, 0.22}, [GROUND_SEA] = {false, 0.10},  [GROUND_SEA_ICE] = {true, 0.03},
+	[GROUND_SNOW] = {false, 0.02},   [GROUND_BLACK] = {false, 0.0}, [GROUND_LAMBERT] = {false, 0.0},
 };
 
 struct ground {
@@ -105,12 +105,7 @@ bool ground_stage_run(const struct ground_stage *stage, struct stage_context *co
 		}
 	}
 	*maps = (struct ground_maps){.map = &ground->map, .relief = &ground->relief};
-	double albedo = scene->ground.albedo_scale, largest = 0;
-	for (int band = 0; band < 3; band++) {
+	for (int band = 0; band < 3; band++)
 		maps->mean[band] = ground->mean[band];
-		largest = fmax(largest,
-			       scene->ground.type == GROUND_LAMBERT ? scene->ground.albedo[band] : types[scene->ground.type].brightest);
-	}
-	maps->brightest = fmin(1, albedo * largest);
 	return true;
 }

@@ -16,7 +16,6 @@ struct ground_maps {
 	const struct texture *map;    /* reflectance per band (650, 550, 450 nm), 0..1 */
 	const struct texture *relief; /* noise of unit variance for what lies close by */
 	double mean[3];               /* of the map */
-	double brightest;             /* no reflectance in the map is larger */
 };
 
 bool ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler);

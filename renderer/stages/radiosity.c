@@ -1,7 +1,6 @@
 #include "renderer/stages/radiosity.h"
 
 #include "renderer/log.h"
-#include "renderer/optics/paper_slab.h"
 #include "renderer/stages/exchange_weights.h"
 
 #include <math.h>
@@ -79,22 +78,19 @@ static bool planes_init(struct planes *planes)
 	return ok;
 }
 
-/* Exchanges until what a round trip leaves falls below the tolerance: both planes' largest albedos bound it. */
-static int count_passes(const struct scene *scene, double max_albedo, double cloud_albedo)
-{
-	if (!scene->radiosity.enabled)
-		return 0;
-	const double round_trip = max_albedo * cloud_albedo;
-	const double wanted = round_trip < 1e-9 ? 1 : 2 * log(scene->radiosity.tolerance) / log(fmin(round_trip, 0.99));
-	return (int)fmin(scene->radiosity.max_passes, ceil(fmax(wanted, 1)));
-}
-
 static void fill_weights(float arguments[PASS_ARGUMENTS][4], const struct scene_clouds *clouds)
 {
 	double weights[EXCHANGE_LEVELS];
 	exchange_weights(clouds->tile_m, clouds->base_m, weights);
 	for (int i = 0; i < EXCHANGE_LEVELS; i++)
 		arguments[i / 4][i % 4] = (float)weights[i];
+	int first = 0, last = EXCHANGE_LEVELS - 1;
+	while (first < last && weights[first] == 0)
+		first++;
+	while (last > first && weights[last] == 0)
+		last--;
+	arguments[2][0] = (float)first;
+	arguments[2][1] = (float)last;
 }
 
 static void run_sources(const struct radiosity_stage *stage, struct planes *planes, const struct ground_maps *ground,
@@ -121,7 +117,9 @@ static void run_exchange(const struct radiosity_stage *stage, struct planes *pla
 	run.samplers[PLANE_COUNT] = &planes->ground_albedo;
 	run.samplers[PLANE_COUNT + 1] = &planes->cloud_albedo;
 	pass_run(stage->passes[kind], &run);
-	for (int i = kind == PASS_CLOSE ? GROUND_RECEIVED : GROUND_SENDS; i < (kind == PASS_CLOSE ? GROUND_SENDS : PLANE_COUNT); i++)
+	/* Closing makes no further light to send; the ground's mean is always asked for. */
+	texture_build_mipmaps(targets[GROUND_RECEIVED]);
+	for (int i = GROUND_SENDS; kind != PASS_CLOSE && i < PLANE_COUNT; i++)
 		texture_build_mipmaps(targets[i]);
 }
 
@@ -162,16 +160,21 @@ static void compute(const struct radiosity_stage *stage, struct planes *planes, 
 		texture_build_mipmaps(targets[i]);
 
 	int at = 0;
-	for (int i = 0; i < result->passes; i++, at = !at)
+	const int most = scene->radiosity.enabled ? scene->radiosity.max_passes : 0;
+	while (result->passes < most) {
 		run_exchange(stage, planes, PASS_EXCHANGE, at, &weights);
+		at = !at;
+		result->passes++;
+		mean_of(&planes->set[at][GROUND_RECEIVED], result->ground_diffuse);
+		result->residual = residual_of(planes, at, result->ground_diffuse);
+		if (result->residual <= scene->radiosity.tolerance)
+			break;
+	}
 	if (result->passes > 0) {
 		run_exchange(stage, planes, PASS_CLOSE, at, &weights);
-		mean_of(&planes->set[!at][GROUND_RECEIVED], result->ground_diffuse);
-		result->residual = residual_of(planes, at, result->ground_diffuse);
 		at = !at;
-	} else {
-		mean_of(&planes->set[at][GROUND_RECEIVED], result->ground_diffuse);
 	}
+	mean_of(&planes->set[at][GROUND_RECEIVED], result->ground_diffuse);
 	mean_of(&planes->ground_direct, result->ground_direct);
 
 	/* The two planes that the view needs move out of the set, whose rest is freed. */
@@ -224,9 +227,8 @@ static struct cache_key make_key(const struct scene *scene)
 	return key;
 }
 
-static struct result *result_compute(const struct radiosity_stage *stage, const struct stage_context *context, const struct scene *scene,
-				     const struct ground_maps *ground, const struct sky_tables *sky, const struct field_maps *field,
-				     const struct slab_tables *slab)
+static struct result *result_compute(const struct radiosity_stage *stage, const struct scene *scene, const struct ground_maps *ground,
+				     const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab)
 {
 	struct planes planes;
 	struct result *result = calloc(1, sizeof *result);
@@ -234,8 +236,6 @@ static struct result *result_compute(const struct radiosity_stage *stage, const 
 		free(result);
 		return NULL;
 	}
-	const double cloud_albedo = 1 - paper_spherical_transmittance(scene->clouds.thickness_m * context->block.extinction[3]);
-	result->passes = count_passes(scene, ground->brightest, cloud_albedo);
 	run_sources(stage, &planes, ground, sky, field, slab);
 	compute(stage, &planes, scene, result);
 	planes_finish(&planes);
@@ -262,7 +262,7 @@ bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_conte
 	if (!result) {
 		context->reused = false;
 		stage_upload_block(context);
-		result = result_compute(stage, context, scene, ground, sky, field, slab);
+		result = result_compute(stage, scene, ground, sky, field, slab);
 		if (!result || !cache_keep(context->cache, &key, result, 2 * texture_bytes(&result->ground_received), result_destroy)) {
 			log_error("radiosity: out of memory");
 			return false;

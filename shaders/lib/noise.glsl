@@ -26,10 +26,10 @@ float noise_unit(uint hash)
 	return float(hash >> 8u) * (1.0 / 16777216.0);
 }
 
+// i modulo period, never negative. By floats, since processors have no vector division of integers; exact for |i| below 2^22.
 int noise_wrap(int i, int period)
 {
-	int m = i - i / period * period;
-	return m < 0 ? m + period : m;
+	return i - period * int(floor((float(i) + 0.5) / float(period)));
 }
 
 // One lattice gradient's contribution; the gradient turns with time, each at a speed of its own.

@@ -6,7 +6,7 @@
 #include "shaders/lib/slab.glsl"
 #include "shaders/lib/sunlight.glsl"
 
-const int SAMPLES = 4; // a side
+const int SAMPLES = 3; // a side
 
 void pass(ivec2 pixel)
 {

@@ -1,0 +1,182 @@
+/* What GLSL has and C++ lacks, so that the files of shaders/lib compile for the processor: vectors by glm, samplers that read copies of
+ * textures, and the members of the scene block as globals. Everything lies in namespace glsl; each use of the library includes its
+ * files in a namespace of its own inside it, after undefining their guards (glsl_again.h).
+ *
+ * Arguments that GLSL leaves undefined are asserted against: roots and logarithms of negative numbers, fetches outside a level,
+ * coordinates that are not finite.
+ */
+#ifndef STRATUS_TESTS_GLSL_SHIM_H
+#define STRATUS_TESTS_GLSL_SHIM_H
+
+#undef NDEBUG
+#include <cassert>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "renderer/scene_block.h"
+
+#define INOUT(type) type &
+
+namespace glsl
+{
+using namespace glm;
+
+inline float sqrt(float x)
+{
+	assert(x >= 0);
+	return std::sqrt(x);
+}
+
+inline float inversesqrt(float x)
+{
+	assert(x > 0);
+	return 1 / std::sqrt(x);
+}
+
+inline float log(float x)
+{
+	assert(x > 0);
+	return std::log(x);
+}
+
+inline float log2(float x)
+{
+	assert(x > 0);
+	return std::log2(x);
+}
+
+inline float pow(float x, float y)
+{
+	assert(x > 0 || (x == 0 && y > 0));
+	return std::pow(x, y);
+}
+
+inline float acos(float x)
+{
+	assert(x >= -1 && x <= 1);
+	return std::acos(x);
+}
+
+/* glm has no smoothstep of floats that asserts its edges in order. */
+inline float smoothstep(float low, float high, float x)
+{
+	assert(low < high);
+	const float t = glm::clamp((x - low) / (high - low), 0.0f, 1.0f);
+	return t * t * (3.0f - 2.0f * t);
+}
+
+/* A texture's levels and how it is sampled. */
+struct image {
+	struct level {
+		int width, height;
+		std::vector<vec4> texels;
+	};
+	std::vector<level> levels;
+	bool repeat_x = false, repeat_y = false, nearest = false;
+};
+
+using sampler2D = std::shared_ptr<const image>;
+
+inline int wrap_texel(int i, int size, bool repeat)
+{
+	return repeat ? ((i % size) + size) % size : glm::clamp(i, 0, size - 1);
+}
+
+inline vec4 sample_level(const image &image, int level, vec2 uv)
+{
+	const image::level &at = image.levels[(size_t)level];
+	const vec2 p = uv * vec2(at.width, at.height) - (image.nearest ? 0.0f : 0.5f);
+	const vec2 base = glm::floor(p), f = image.nearest ? vec2(0.0f) : p - base;
+	const int x[2] = {wrap_texel((int)base.x, at.width, image.repeat_x), wrap_texel((int)base.x + 1, at.width, image.repeat_x)};
+	const int y[2] = {wrap_texel((int)base.y, at.height, image.repeat_y), wrap_texel((int)base.y + 1, at.height, image.repeat_y)};
+	vec4 texel[2][2];
+	for (int i = 0; i < 2; i++)
+		for (int k = 0; k < 2; k++)
+			texel[i][k] = at.texels[(size_t)y[i] * (size_t)at.width + (size_t)x[k]];
+	return glm::mix(glm::mix(texel[0][0], texel[0][1], f.x), glm::mix(texel[1][0], texel[1][1], f.x), f.y);
+}
+
+inline vec4 textureLod(const sampler2D &sampler, vec2 uv, float lod)
+{
+	assert(sampler && std::isfinite(uv.x) && std::isfinite(uv.y) && std::isfinite(lod));
+	const int last = (int)sampler->levels.size() - 1;
+	const float bounded = glm::clamp(lod, 0.0f, (float)last);
+	if (sampler->nearest)
+		return sample_level(*sampler, (int)std::floor(bounded + 0.5f), uv);
+	const int level = (int)bounded;
+	const vec4 fine = sample_level(*sampler, level, uv);
+	return level == last ? fine : glm::mix(fine, sample_level(*sampler, level + 1, uv), bounded - (float)level);
+}
+
+inline vec4 texelFetch(const sampler2D &sampler, ivec2 at, int level)
+{
+	assert(sampler && level >= 0 && (size_t)level < sampler->levels.size());
+	const image::level &from = sampler->levels[(size_t)level];
+	assert(at.x >= 0 && at.x < from.width && at.y >= 0 && at.y < from.height);
+	return from.texels[(size_t)at.y * (size_t)from.width + (size_t)at.x];
+}
+
+/* Samplers of the library. */
+static sampler2D field_coarse, field_detail, ground_map, ground_relief, height_table, height_maximum;
+static sampler2D phase_table, forward_peak_table, forward_blur_table, slab_sun_table, slab_view_table;
+static sampler2D transmittance_table, multiscatter_table, sky_total, sky_near, air_to_layer, air_to_end;
+static sampler2D ground_received, cloud_received;
+
+/* Arguments of the pass, and what it stores. */
+static vec4 arguments[4], stored[8];
+#define STORE(index, value) stored[index] = (value)
+
+/* The scene block: one vector per member. */
+#define GLSL_BLOCK(X)                                                                                                                      \
+	X(sun_direction)                                                                                                                   \
+	X(sun_at_camera)                                                                                                                   \
+	X(solar_irradiance)                                                                                                                \
+	X(rayleigh)                                                                                                                        \
+	X(aerosol)                                                                                                                         \
+	X(aerosol_shape)                                                                                                                   \
+	X(ozone)                                                                                                                           \
+	X(ground_albedo)                                                                                                                   \
+	X(ground_patch)                                                                                                                    \
+	X(ground_mean_albedo)                                                                                                              \
+	X(camera_position)                                                                                                                 \
+	X(camera_right)                                                                                                                    \
+	X(camera_up)                                                                                                                       \
+	X(camera_forward)                                                                                                                  \
+	X(image_size)                                                                                                                      \
+	X(cloud_layer)                                                                                                                     \
+	X(cloud_field)                                                                                                                     \
+	X(cloud_drift)                                                                                                                     \
+	X(cloud_detail)                                                                                                                    \
+	X(cloud_threshold)                                                                                                                 \
+	X(extinction)                                                                                                                      \
+	X(extinction_modified)                                                                                                             \
+	X(sky_irradiance_cloud)                                                                                                            \
+	X(sky_irradiance_ground)                                                                                                           \
+	X(air_below)                                                                                                                       \
+	X(band_red)                                                                                                                        \
+	X(band_green)                                                                                                                      \
+	X(band_blue)                                                                                                                       \
+	X(develop)
+
+#define GLSL_MEMBER(name) static vec4 name;
+GLSL_BLOCK(GLSL_MEMBER)
+#undef GLSL_MEMBER
+
+#define GLSL_COUNT(name) +1
+static_assert(sizeof(scene_block) == 16 * (0 GLSL_BLOCK(GLSL_COUNT)), "the scene block has other members than GLSL_BLOCK");
+#undef GLSL_COUNT
+
+/* Copies the block to the globals, as an upload of the uniform buffer does. */
+inline void set_scene_block(const scene_block &block)
+{
+#define GLSL_COPY(name) std::memcpy(&name, block.name, sizeof name);
+	GLSL_BLOCK(GLSL_COPY)
+#undef GLSL_COPY
+}
+} // namespace glsl
+
+#endif

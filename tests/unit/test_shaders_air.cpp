@@ -1,0 +1,319 @@
+/* The GLSL library compiled for the processor: rays over the sphere, air, camera and sky tables, against independent values. */
+extern "C" {
+#include "renderer/scene.h"
+#include "renderer/stages/view.h"
+}
+#include "tests/unit/glsl_shim.h"
+
+#include <cstdarg>
+#include <csetjmp>
+#include <cstdint>
+extern "C" {
+#include <cmocka.h>
+}
+
+namespace glsl
+{
+namespace air
+{
+#include "shaders/lib/camera.glsl"
+#include "shaders/lib/scattering.glsl"
+#include "shaders/lib/sky_table.glsl"
+} // namespace air
+} // namespace glsl
+
+using namespace glsl::air;
+using glsl::ivec2;
+using glsl::vec2;
+using glsl::vec3;
+using glsl::vec4;
+
+using real = long double;
+static const double earth = 6371000.;
+
+#define assert_near(a, b, tolerance)                                                                                                       \
+	do {                                                                                                                               \
+		const double a_ = (double)(a), b_ = (double)(b), t_ = (double)(tolerance);                                                 \
+		if (!(std::fabs(a_ - b_) <= t_))                                                                                           \
+			fail_msg("%s = %.9g, expected %.9g within %.3g", #a, a_, b_, t_);                                                  \
+	} while (0)
+
+/* --- rays over the sphere -------------------------------------------------------------------------------------------------------- */
+
+/* Height after distance t, in a precision where squaring radii does no harm. */
+static double exact_height(double h, double mu, double t)
+{
+	const real r = (real)earth + h;
+	return (double)(std::sqrt(r * r + 2 * r * mu * t + (real)t * t) - (real)earth);
+}
+
+static void spheres_are_met(void **)
+{
+	const float heights[] = {0.f, 2.f, 150.f, 1200.f, 9000.f, 29000.f}, targets[] = {0.f, 100.f, 1500.f, 12000.f, 99000.f};
+	int met = 0;
+	for (float h : heights)
+		for (float target : targets)
+			for (int i = -200; i <= 200; i++) {
+				const float mu = (float)i / 200.f, up = sphere_distance_up(h, mu, target),
+					    down = sphere_distance_down(h, mu, target);
+				/* Centimetres of height; rays through the Earth are nobody's. */
+				if (up >= 0 && target > h && mu >= sphere_horizon(h)) {
+					assert_near(exact_height(h, mu, up), target, 0.02 + 1e-6 * target);
+					met++;
+				}
+				if (down >= 0) {
+					assert_true(target <= h && mu < 0);
+					assert_near(exact_height(h, mu, down), target, 0.02 + 1e-6 * h);
+					assert_near(sphere_height(h, mu, down), target, 0.02 + 1e-6 * h);
+					met++;
+				}
+			}
+	assert_true(met > 4000);
+}
+
+static void spheres_are_missed(void **)
+{
+	/* From 10 km the horizon lies at a dip of acos(R/(R+h)); a ray just above it misses the ground, one just below meets it. */
+	for (double h : {2., 1000., 10000., 30000.}) {
+		const double horizon = -std::sin(std::acos(earth / (earth + h)));
+		assert_near(sphere_horizon((float)h), horizon, 3e-5 * -horizon);
+		assert_true(sphere_distance_down((float)h, (float)(horizon * 0.999), 0.f) < 0);
+		assert_true(sphere_distance_down((float)h, (float)(horizon * 1.001), 0.f) > 0);
+	}
+	assert_true(sphere_distance_up(5000.f, -0.5f, 1000.f) > 0);
+	assert_true(sphere_distance_up(5000.f, 0.5f, 1000.f) < 0);
+}
+
+static void heights_and_verticals_along_a_ray(void **)
+{
+	for (double h : {0., 300., 12000.})
+		for (double mu : {-0.01, 0., 0.02, 0.5, 1.})
+			for (double t : {1., 1e3, 5e4, 8e5}) {
+				const double height = exact_height(h, mu, t);
+				assert_near(sphere_height((float)h, (float)mu, (float)t), height,
+					    0.02 + 2e-6 * std::fabs(height) + 1e-7 * t);
+				assert_near(sphere_cosine((float)h, (float)mu, (float)t, (float)height),
+					    ((earth + h) * mu + t) / (earth + height), 2e-6);
+			}
+}
+
+/* --- air --------------------------------------------------------------------------------------------------------------------------- */
+
+/* Bodhaine et al. 1999 for the whole air at sea level, and nothing else in it. */
+static const double rayleigh_thickness[3] = {0.04715, 0.09297, 0.2115};
+
+static void set_clean_air(double aerosol_depth)
+{
+	struct scene_block block = {};
+	for (int band = 0; band < 3; band++) {
+		block.rayleigh[band] = (float)(rayleigh_thickness[band] / 8000.);
+		block.aerosol[band] = (float)(aerosol_depth / 1200.);
+		block.ozone[band] = 0;
+		block.solar_irradiance[band] = 1;
+	}
+	block.rayleigh[3] = 8000;
+	block.aerosol[3] = 1200;
+	block.ozone[3] = 25000;
+	block.sun_direction[3] = 0.00465f;
+	glsl::set_scene_block(block);
+}
+
+static void air_straight_up(void **)
+{
+	set_clean_air(0);
+	const vec3 depth = atmosphere_optical_thickness(0, 1, sphere_distance_up(0, 1, ATMOSPHERE_HEIGHT), 512);
+	for (int band = 0; band < 3; band++)
+		assert_near(depth[band], rayleigh_thickness[band], 3e-4 * rayleigh_thickness[band]);
+	/* Aerosol: optical depth by definition; ozone: the integral of the tent is its half-width. */
+	set_clean_air(0.3);
+	const vec3 hazy = atmosphere_optical_thickness(0, 1, ATMOSPHERE_HEIGHT, 4000);
+	assert_near(hazy.y - depth.y, 0.3, 1e-3);
+	double tent = 0;
+	for (int i = 0; i < 10000; i++)
+		tent += 10. * (double)ozone_profile((float)(i * 10 + 5));
+	assert_near(tent, 15000, 1);
+}
+
+/* Kasten and Young's relative air mass at zenith angles 60, 80, 85 deg; an atmosphere of one scale height has a little
+ * less, and at the horizon Chapman's function, sqrt(pi R / 2 H). */
+static void air_slantwise(void **)
+{
+	set_clean_air(0);
+	const double angles[] = {60, 80, 85}, masses[] = {1.994, 5.60, 10.4};
+	for (int i = 0; i < 3; i++) {
+		const float mu = (float)std::cos(angles[i] * M_PI / 180);
+		const vec3 depth = atmosphere_optical_thickness(0, mu, sphere_distance_up(0, mu, ATMOSPHERE_HEIGHT), 2000);
+		assert_near((double)depth.y / rayleigh_thickness[1], masses[i], 0.03 * masses[i]);
+	}
+	const vec3 horizon = atmosphere_optical_thickness(0, 0, sphere_distance_up(0, 0, ATMOSPHERE_HEIGHT), 4000);
+	assert_near((double)horizon.y / rayleigh_thickness[1], std::sqrt(M_PI * earth / 16000), 0.4);
+}
+
+/* Integral over the sphere of a function of the scattering angle's cosine, and of that times the cosine. */
+template <class Function> static void moments(Function function, double &norm, double &mean)
+{
+	const int steps = 20000;
+	norm = mean = 0;
+	for (int i = 0; i < steps; i++) {
+		const double c = -1 + 2 * (i + 0.5) / steps, weight = 2 * M_PI * 2 / steps * (double)function((float)c);
+		norm += weight;
+		mean += weight * c;
+	}
+}
+
+static void phase_functions_are_normalised(void **)
+{
+	double norm, mean;
+	moments([](float c) { return phase_rayleigh(c); }, norm, mean);
+	assert_near(norm, 1, 1e-5);
+	assert_near(mean, 0, 1e-5);
+	for (double g : {0., 0.3, 0.7, 0.9}) {
+		moments([g](float c) { return phase_aerosol(c, (float)g); }, norm, mean);
+		assert_near(norm, 1, 2e-4);
+		/* Cornette and Shanks: g (3/5) (4 + g^2)/(2 + g^2). */
+		assert_near(mean, 0.6 * g * (4 + g * g) / (2 + g * g), 3e-4);
+	}
+	assert_near((double)phase_rayleigh(1) / (double)phase_rayleigh(0), 2, 1e-6);
+}
+
+static void transmittance_mapping_round_trip(void **)
+{
+	for (int row = 0; row < 64; row++)
+		for (int column = 0; column < 256; column++) {
+			const vec2 at = (vec2((float)column, (float)row) + 0.5f) / TRANSMITTANCE_SIZE;
+			const vec2 p = transmittance_parameters(at), back = transmittance_coordinates(p.x, p.y);
+			assert_true(p.x >= 0 && p.x <= ATMOSPHERE_HEIGHT * 1.00001f && std::fabs(p.y) <= 1);
+			/* In texels; the topmost row is a single point. */
+			if (row < 63)
+				assert_near(back.x * 256, at.x * 256, 0.06);
+			assert_near(back.y * 64, at.y * 64, 0.02);
+		}
+}
+
+static void multiscatter_mapping_round_trip(void **)
+{
+	for (int row = 0; row < 32; row++)
+		for (int column = 0; column < 32; column++) {
+			const vec2 at = (vec2((float)column, (float)row) + 0.5f) / MULTISCATTER_SIZE;
+			const vec2 p = multiscatter_parameters(at), back = multiscatter_coordinates(p.x, p.y);
+			assert_near(back.x, at.x, 1e-4);
+			assert_near(back.y, at.y, 1e-4);
+		}
+}
+
+/* --- sky tables ---------------------------------------------------------------------------------------------------------------------- */
+
+/* Texel -> direction -> coordinates: the same texel, for cameras and suns of any height. */
+static void sky_mapping_round_trip(void **)
+{
+	for (float height : {2.f, 1500.f, 12000.f})
+		for (double elevation : {-3., 5., 40., 80.}) {
+			const double e = elevation * M_PI / 180, a = 2.1;
+			glsl::camera_position = vec4(0, 0, height, 0);
+			glsl::sun_direction = vec4(std::cos(e) * std::sin(a), std::cos(e) * std::cos(a), std::sin(e), 0.005f);
+			for (int row = 0; row < 160; row++)
+				for (int column = 0; column < 96; column++) {
+					const vec2 p = sky_table_parameters(ivec2(column, row));
+					const double flat = std::sqrt(std::fmax(0., 1. - (double)p.x * (double)p.x));
+					if (flat < 1e-3 || row == 0 || row == 80)
+						continue; /* straight up and down have no azimuth, the horizon has two rows */
+					const double turn = a + std::acos(std::fmax(-1., std::fmin(1., (double)p.y)));
+					const vec3 direction(flat * std::sin(turn), flat * std::cos(turn), p.x);
+					const vec2 at = sky_table_coordinates(direction) * SKY_TABLE_SIZE - 0.5f;
+					/* The columns next to the sun are closer than float cosines tell apart. */
+					assert_near(at.x, column, column < 6 ? 3.5 : 0.25);
+					assert_near(at.y, row, 0.05);
+				}
+		}
+}
+
+/* --- camera ----------------------------------------------------------------------------------------------------------------------------
+ */
+
+static void set_camera(double azimuth, double elevation, double roll, double fov)
+{
+	struct scene scene = scene_default();
+	struct scene_block block = {};
+	scene.camera.azimuth_deg = azimuth;
+	scene.camera.elevation_deg = elevation;
+	scene.camera.roll_deg = roll;
+	scene.camera.vertical_fov_deg = fov;
+	scene.output.width = 200;
+	scene.output.height = 100;
+	view_fill_block(&block, &scene);
+	glsl::set_scene_block(block);
+}
+
+static vec3 direction_of(double azimuth, double elevation)
+{
+	const double a = azimuth * M_PI / 180, e = elevation * M_PI / 180;
+	return vec3(std::cos(e) * std::sin(a), std::cos(e) * std::cos(a), std::sin(e));
+}
+
+static void assert_direction(vec3 a, vec3 b)
+{
+	assert_near(glm::length(a - b), 0, 2e-6);
+}
+
+static void camera_looks_where_it_should(void **)
+{
+	for (double azimuth : {0., 90., 200., 359.})
+		for (double elevation : {-90., -30., 0., 45., 90.})
+			for (double roll : {-180., -20., 0., 77.}) {
+				set_camera(azimuth, elevation, roll, 60);
+				assert_direction(camera_ray(vec2(100, 50)), direction_of(azimuth, elevation));
+			}
+	set_camera(90, 0, 0, 60);
+	/* East: south to the right, up above; half the field of view to the upper and lower edges. */
+	assert_direction(camera_ray(vec2(100, 0)), direction_of(90, 30));
+	assert_direction(camera_ray(vec2(100, 100)), direction_of(90, -30));
+	const double half = std::atan(2 * std::tan(M_PI / 6)) * 180 / M_PI;
+	assert_direction(camera_ray(vec2(200, 50)), direction_of(90 + half, 0));
+	assert_direction(camera_ray(vec2(0, 50)), direction_of(90 - half, 0));
+}
+
+/* A roll of +90 turns the picture clockwise: what was up is then at the right. */
+static void roll_turns_the_picture_clockwise(void **)
+{
+	set_camera(0, 0, 90, 60);
+	const vec3 right_edge = camera_ray(vec2(150, 50)), upper = camera_ray(vec2(100, 0));
+	assert_true(right_edge.z > 0.4f);
+	assert_near(right_edge.x, 0, 1e-6);
+	/* and what was at the left, the west, is up. */
+	assert_true(upper.x < -0.4f);
+	assert_near(upper.z, 0, 1e-6);
+}
+
+/* At the poles, the top of the picture is what lies ahead when looking up at the nadir, and behind at the zenith: no jump on the way. */
+static void up_at_the_poles(void **)
+{
+	for (double pole : {-90., 90.}) {
+		set_camera(70, pole, 0, 60);
+		const vec3 at_pole = camera_ray(vec2(60, 0));
+		set_camera(70, pole * 0.99999, 0, 60);
+		assert_near(glm::length(at_pole - camera_ray(vec2(60, 0))), 0, 1e-3);
+	}
+	set_camera(0, -90, 0, 60);
+	assert_true(camera_ray(vec2(100, 0)).y > 0.4f);
+	set_camera(0, 90, 0, 60);
+	assert_true(camera_ray(vec2(100, 0)).y < -0.4f);
+}
+
+int main()
+{
+	const CMUnitTest tests[] = {
+		cmocka_unit_test(spheres_are_met),
+		cmocka_unit_test(spheres_are_missed),
+		cmocka_unit_test(heights_and_verticals_along_a_ray),
+		cmocka_unit_test(air_straight_up),
+		cmocka_unit_test(air_slantwise),
+		cmocka_unit_test(phase_functions_are_normalised),
+		cmocka_unit_test(transmittance_mapping_round_trip),
+		cmocka_unit_test(multiscatter_mapping_round_trip),
+		cmocka_unit_test(sky_mapping_round_trip),
+		cmocka_unit_test(camera_looks_where_it_should),
+		cmocka_unit_test(roll_turns_the_picture_clockwise),
+		cmocka_unit_test(up_at_the_poles),
+	};
+	return cmocka_run_group_tests(tests, nullptr, nullptr);
+}

@@ -28,8 +28,8 @@ static const struct {
 	double detail_weight; /* of the detail below the texel */
 	double overcast_lift; /* share of the range by which the threshold sinks below all densities as coverage reaches 1 */
 } shapes[CLOUD_TYPE_COUNT] = {
-	[CLOUD_STRATUS] = {0.6, 0.05, 0.5},
-	[CLOUD_STRATOCUMULUS] = {1.15, 0.10, 0.12},
+	[CLOUD_STRATUS] = {0.6, 0.05, 0.4},
+	[CLOUD_STRATOCUMULUS] = {0.75, 0.09, 0.10},
 };
 
 /* Detail repeats after about this length (the tile divided by a whole number), in m. */

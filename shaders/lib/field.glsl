@@ -8,6 +8,9 @@ uniform sampler2D field_coarse;
 uniform sampler2D field_detail;
 #endif
 
+// Excess density, over its range, at which the edge of a cloud has half the thickness that its middle would have.
+const float FIELD_SKIRT = 0.06;
+
 // Cubic B-spline interpolation of a repeating texture out of four bilinear samples (Sigg and Hadwiger, GPU Gems 2, chapter 20).
 float field_bicubic(sampler2D field, vec2 uv, float size, float lod)
 {
@@ -51,7 +54,8 @@ float field_thickness_of(float density, float footprint)
 	float softness = 0.012 + 0.05 * (1.0 - exp(-footprint * (1.0 / 150.0)));
 	float x = excess / softness;
 	float soft = x > 20.0 ? excess : x < -12.0 ? 0.0 : softness * log(1.0 + exp(x));
-	return cloud_layer.y * min(pow(soft, cloud_threshold.z), 1.0);
+	// A thin skirt around a thick middle: edges are translucent over some 100 m.
+	return cloud_layer.y * min(pow(soft, cloud_threshold.z) * soft / (soft + FIELD_SKIRT), 1.0);
 }
 
 float field_thickness(vec2 place, float footprint)

@@ -86,7 +86,7 @@ float height_intersect(vec3 direction, float from, float to, float pixel_angle)
 // Upward normal of the top; differences over what a pixel covers, at least a few mean free paths, since light does not see finer relief.
 vec3 height_normal(vec2 place, float footprint)
 {
-	float e = max(2.5 * cloud_layer.z / HEIGHT_SIZE, footprint);
+	float e = max(3.5 * cloud_layer.z / HEIGHT_SIZE, footprint);
 	float dx = height_at(place + vec2(e, 0.0), e) - height_at(place - vec2(e, 0.0), e);
 	float dy = height_at(place + vec2(0.0, e), e) - height_at(place - vec2(0.0, e), e);
 	return normalize(vec3(-dx, -dy, 2.0 * e));

@@ -212,6 +212,25 @@ static void fill_threshold(struct scene_block *block, const struct scene_clouds 
 	block->cloud_threshold[2] = (float)shapes[clouds->type].exponent;
 }
 
+/* Level 0 from the heights, each further level from the one below it. That one is read through a view of it alone: levels that are being
+ * written must not be within a sampler's reach, nor, where images are written, outside the texture's own. */
+static void maximum_level(const struct field_stage *stage, struct height_field *field, int level)
+{
+	struct texture below = field->height;
+	if (level > 0) {
+		below = field->maximum;
+		glGenTextures(1, &below.id);
+		glTextureView(below.id, GL_TEXTURE_2D, field->maximum.id, texture_internal_format(field->maximum.format),
+			      (GLuint)(level - 1), 1, 0, 1);
+	}
+	pass_run(stage->passes[PASS_MAXIMUM], &(struct pass_run){.targets = (struct texture *[]){&field->maximum},
+								 .level = level,
+								 .samplers = {&below},
+								 .arguments = {{(float)(HEIGHT_SIDE >> level), level == 0 ? 1 : 0}}});
+	if (level > 0)
+		texture_finish(&below);
+}
+
 static struct height_field *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse)
 {
 	struct height_field *field = calloc(1, sizeof *field);
@@ -227,18 +246,8 @@ static struct height_field *height_field_compute(const struct field_stage *stage
 								.samplers = {&coarse->coarse, &coarse->detail},
 								.arguments = {{(float)HEIGHT_SIDE}}});
 	texture_build_mipmaps(&field->height);
-	/* Level 0 from the heights, each further level from the one below it; the texture's readable levels are limited to those that are
-	 * written. */
-	for (int level = 0; level < field->maximum.levels; level++) {
-		if (level > 0)
-			glTextureParameteri(field->maximum.id, GL_TEXTURE_MAX_LEVEL, level - 1);
-		pass_run(stage->passes[PASS_MAXIMUM], &(struct pass_run){.targets = (struct texture *[]){&field->maximum},
-									 .level = level,
-									 .samplers = {level == 0 ? &field->height : &field->maximum},
-									 .arguments = {{(float)(HEIGHT_SIDE >> level), level == 0 ? 1 : 0,
-											(float)(level == 0 ? 0 : level - 1)}}});
-	}
-	glTextureParameteri(field->maximum.id, GL_TEXTURE_MAX_LEVEL, field->maximum.levels - 1);
+	for (int level = 0; level < field->maximum.levels; level++)
+		maximum_level(stage, field, level);
 	return field;
 }
 

@@ -8,13 +8,12 @@ uniform sampler2D height_below;
 void pass(ivec2 pixel)
 {
 	int size = int(arguments[0].x);
-	int level = int(arguments[0].z);
 	int reach = arguments[0].y > 0.5 ? 1 : 0;
 	float highest = 0.0;
 	for (int y = -reach; y < 2 + reach; y++)
 		for (int x = -reach; x < 2 + reach; x++) {
 			ivec2 at = (pixel * 2 + ivec2(x, y) + size) % size;
-			highest = max(highest, texelFetch(height_below, at, level).x);
+			highest = max(highest, texelFetch(height_below, at, 0).x);
 		}
 	STORE(0, vec4(highest, 0.0, 0.0, 1.0));
 }

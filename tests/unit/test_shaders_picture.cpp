@@ -1,0 +1,307 @@
+/* Pictures from OpenGL against the same pixels rendered by the processor: the library and the view pass compiled as C++, fed with copies
+ * of the textures that the stages made; and fragment against compute programs. Wants build/mie.kernel, or the file that STRATUS_KERNEL
+ * names; skipped where there is no EGL. */
+extern "C" {
+#include "renderer/gl/context.h"
+#include "renderer/optics/kernel.h"
+#include "renderer/stages/view.h"
+}
+#include "tests/unit/glsl_shim.h"
+
+#include <epoxy/gl.h>
+
+#include <cstdarg>
+#include <csetjmp>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+extern "C" {
+#include <cmocka.h>
+}
+
+static const char *const side_names[3] = {"clear", "below", "above"};
+
+/* The view pass, once for each side. */
+#define VIEW_REGION 0
+#define OUTPUTS     1
+#define VIEW_CLOUDS 0
+#define VIEW_ABOVE  0
+namespace glsl
+{
+namespace clear
+{
+#include "shaders/passes/view.glsl"
+} // namespace clear
+#include "tests/unit/glsl_again.h"
+#undef VIEW_CLOUDS
+#define VIEW_CLOUDS 1
+namespace below
+{
+#include "shaders/passes/view.glsl"
+} // namespace below
+#include "tests/unit/glsl_again.h"
+#undef VIEW_ABOVE
+#define VIEW_ABOVE 1
+namespace above
+{
+#include "shaders/passes/view.glsl"
+} // namespace above
+} // namespace glsl
+#undef VIEW_ABOVE
+#undef VIEW_CLOUDS
+
+static void (*const cpu_pass[3])(glsl::ivec2) = {glsl::clear::pass, glsl::below::pass, glsl::above::pass};
+
+enum { WIDTH = 96, HEIGHT = 72, LAYERS = 5 };
+static const layer layers[LAYERS] = {LAYER_COLOR, LAYER_ORDER1, LAYER_MULTIPLE, LAYER_AIR, LAYER_OPTICAL_THICKNESS};
+
+struct picture {
+	std::vector<float> layer[LAYERS]; /* RGBA */
+};
+
+struct pipeline {
+	gl_context *gl;
+	kernel *optics_kernel;
+	stage_context context;
+	ground_stage ground;
+	sky_stage sky;
+	field_stage field;
+	radiosity_stage radiosity;
+	view_stage view;
+};
+
+/* What a frame is made of; valid until the next. */
+struct made {
+	ground_maps ground;
+	sky_tables sky;
+	field_maps field;
+	radiosity_light light;
+	const droplets *drops;
+	const slab_tables *slab;
+};
+
+static pipeline shared;
+
+static void start(pass_kind kind)
+{
+	const pass_compiler compiler = {kind, nullptr};
+	shared.context.cache = cache_create(256u << 20);
+	shared.context.kernel = shared.optics_kernel;
+	glCreateBuffers(1, &shared.context.block_buffer);
+	glNamedBufferStorage(shared.context.block_buffer, sizeof shared.context.block, nullptr, GL_DYNAMIC_STORAGE_BIT);
+	assert_true(ground_stage_init(&shared.ground, &compiler) && sky_stage_init(&shared.sky, &compiler));
+	assert_true(field_stage_init(&shared.field, &compiler) && radiosity_stage_init(&shared.radiosity, &compiler));
+	assert_true(view_stage_init(&shared.view, &compiler));
+}
+
+static void stop()
+{
+	view_stage_finish(&shared.view);
+	radiosity_stage_finish(&shared.radiosity);
+	field_stage_finish(&shared.field);
+	sky_stage_finish(&shared.sky);
+	ground_stage_finish(&shared.ground);
+	cache_destroy(shared.context.cache);
+	glDeleteBuffers(1, &shared.context.block_buffer);
+}
+
+static scene make_scene(int side)
+{
+	struct scene scene = scene_default();
+	scene.output.width = WIDTH;
+	scene.output.height = HEIGHT;
+	scene.camera.azimuth_deg = 80;
+	scene.clouds.resolution = 128;
+	if (side == 0)
+		scene.clouds.type = CLOUD_NONE;
+	scene.camera.elevation_deg = side == 1 ? 25 : 8;
+	if (side == 2) {
+		scene.camera.position_m[2] = 2600;
+		scene.camera.elevation_deg = -30;
+		scene.camera.roll_deg = 12;
+	}
+	return scene;
+}
+
+/* The stages in their order, as renderer.c runs them. */
+static void run_stages(const scene &scene, made &out)
+{
+	const double albedo[3] = {0.3, 0.3, 0.25};
+	stage_context *context = &shared.context;
+	const bool clouds = scene.clouds.type != CLOUD_NONE;
+	cache_begin_frame(context->cache);
+	context->block = {};
+	view_fill_block(&context->block, &scene);
+	context->block.cloud_layer[0] = (float)scene.clouds.base_m;
+	context->block.cloud_layer[1] = (float)scene.clouds.thickness_m;
+	context->block.cloud_layer[3] = clouds;
+	out.drops = droplets_get(context, &scene);
+	assert_non_null(out.drops);
+	out.slab = slab_tables_get(context, &scene, out.drops);
+	assert_non_null(out.slab);
+	assert_true(ground_stage_run(&shared.ground, context, &scene, &out.ground));
+	assert_true(sky_stage_run(&shared.sky, context, &scene, albedo, &out.sky));
+	assert_true(field_stage_run(&shared.field, context, &scene, scene.camera.position_m[2] > scene.clouds.base_m, &out.field));
+	for (int band = 0; band < 3; band++)
+		context->block.air_below[band] = 1;
+	if (clouds)
+		assert_true(
+			radiosity_stage_run(&shared.radiosity, context, &scene, &out.ground, &out.sky, &out.field, out.slab, &out.light));
+	stage_upload_block(context);
+}
+
+static picture render_gpu(const scene &scene, made &out)
+{
+	picture picture;
+	const texture *textures[LAYERS];
+	run_stages(scene, out);
+	const view_inputs inputs = {&out.ground, out.drops,  out.slab,
+				    &out.sky,    &out.field, scene.clouds.type == CLOUD_NONE ? nullptr : &out.light};
+	assert_true(view_stage_run(&shared.view, &shared.context, &scene, &inputs, layers, LAYERS, nullptr, nullptr, textures));
+	for (int i = 0; i < LAYERS; i++) {
+		picture.layer[i].resize(4 * WIDTH * HEIGHT);
+		stage_read_texture(textures[i], 0, 4, picture.layer[i].data());
+	}
+	assert_false(gl_failed("rendering"));
+	return picture;
+}
+
+/* A texture's texels and how it is sampled, as OpenGL says. */
+static glsl::sampler2D copy_of(const texture *texture)
+{
+	auto image = std::make_shared<glsl::image>();
+	GLint wrap_s, wrap_t, filter;
+	if (!texture)
+		return nullptr;
+	glGetTextureParameteriv(texture->id, GL_TEXTURE_WRAP_S, &wrap_s);
+	glGetTextureParameteriv(texture->id, GL_TEXTURE_WRAP_T, &wrap_t);
+	glGetTextureParameteriv(texture->id, GL_TEXTURE_MAG_FILTER, &filter);
+	image->repeat_x = wrap_s == GL_REPEAT;
+	image->repeat_y = wrap_t == GL_REPEAT;
+	image->nearest = filter == GL_NEAREST;
+	for (int level = 0; level < texture->levels; level++) {
+		glsl::image::level to;
+		to.width = glm::max(1, texture->width >> level);
+		to.height = glm::max(1, texture->height >> level);
+		to.texels.resize((size_t)to.width * (size_t)to.height);
+		stage_read_texture(texture, level, 4, &to.texels[0].x);
+		image->levels.push_back(to);
+	}
+	return image;
+}
+
+static void copy_textures(const made &out)
+{
+	glsl::transmittance_table = copy_of(out.sky.transmittance);
+	glsl::sky_total = copy_of(out.sky.total);
+	glsl::sky_near = copy_of(out.sky.near);
+	glsl::air_to_layer = copy_of(out.sky.to_layer);
+	glsl::air_to_end = copy_of(out.sky.to_end);
+	glsl::ground_map = copy_of(out.ground.map);
+	glsl::ground_relief = copy_of(out.ground.relief);
+	glsl::field_coarse = copy_of(out.field.coarse);
+	glsl::field_detail = copy_of(out.field.detail);
+	glsl::height_table = copy_of(out.field.height);
+	glsl::height_maximum = copy_of(out.field.maximum);
+	glsl::phase_table = copy_of(&out.drops->phase);
+	glsl::forward_peak_table = copy_of(&out.drops->forward_peak);
+	glsl::forward_blur_table = copy_of(&out.drops->forward_blur);
+	glsl::slab_sun_table = copy_of(&out.slab->sun);
+	glsl::slab_view_table = copy_of(&out.slab->view);
+	glsl::ground_received = copy_of(out.light.ground_received);
+	glsl::cloud_received = copy_of(out.light.cloud_received);
+}
+
+static picture render_cpu(int side, const made &out)
+{
+	picture picture;
+	copy_textures(out);
+	glsl::set_scene_block(shared.context.block);
+	for (int i = 0; i < LAYERS; i++) {
+		glsl::arguments[0].x = (float)layers[i];
+		for (int y = 0; y < HEIGHT; y++)
+			for (int x = 0; x < WIDTH; x++) {
+				cpu_pass[side](glsl::ivec2(x, y));
+				for (int k = 0; k < 4; k++)
+					picture.layer[i].push_back(glsl::stored[0][k]);
+			}
+	}
+	return picture;
+}
+
+struct difference {
+	double psnr;    /* against the largest value, dB */
+	double outside; /* share of pixels that differ by more than a thousandth of the largest value */
+};
+
+static difference compare(const std::vector<float> &a, const std::vector<float> &b)
+{
+	double peak = 0, squares = 0;
+	int outside = 0;
+	for (size_t i = 0; i < a.size(); i++)
+		if (i % 4 < 3)
+			peak = std::fmax(peak, (double)a[i]);
+	for (size_t i = 0; i < a.size(); i++) {
+		const double d = (double)a[i] - (double)b[i];
+		assert_true(std::isfinite(d));
+		squares += i % 4 < 3 ? d * d : 0;
+		outside += i % 4 < 3 && std::fabs(d) > 1e-3 * peak;
+	}
+	const double count = 0.75 * (double)a.size(), mean_square = squares / count;
+	if (mean_square <= 1e-12 * peak * peak)
+		return {120, outside / count}; /* also where both are black */
+	return {10 * std::log10(peak * peak / mean_square), outside / count};
+}
+
+static void compare_layers(const char *what, const picture &a, const picture &b, double floor)
+{
+	for (int i = 0; i < LAYERS; i++) {
+		const difference d = compare(a.layer[i], b.layer[i]);
+		print_message("%s, %s: %.1f dB, %.2f %% of values differ by over 0.1 %%\n", what, scene_layer_names[layers[i]], d.psnr,
+			      100 * d.outside);
+		assert_true(d.psnr >= floor);
+		assert_true(d.outside <= 0.02);
+	}
+}
+
+static picture by_fragments[3];
+
+static void gpu_shows_what_the_library_says(void **)
+{
+	/* Hardware interpolates textures with fractions of 8 bits. */
+	const double floor = gl_context_info(shared.gl)->software ? 90 : 50;
+	start(PASS_FRAGMENT);
+	for (int side = 0; side < 3; side++) {
+		made out = {};
+		by_fragments[side] = render_gpu(make_scene(side), out);
+		compare_layers(side_names[side], by_fragments[side], render_cpu(side, out), floor);
+	}
+	stop();
+}
+
+static void compute_shows_what_fragments_show(void **)
+{
+	start(PASS_COMPUTE);
+	for (int side = 0; side < 3; side++) {
+		made out = {};
+		compare_layers(side_names[side], by_fragments[side], render_gpu(make_scene(side), out), 90);
+	}
+	stop();
+}
+
+int main()
+{
+	const char *path = getenv("STRATUS_KERNEL");
+	const CMUnitTest tests[] = {
+		cmocka_unit_test(gpu_shows_what_the_library_says),
+		cmocka_unit_test(compute_shows_what_fragments_show),
+	};
+	shared.gl = gl_context_create(-1, false);
+	if (!shared.gl)
+		return 77;
+	shared.optics_kernel = kernel_load(path ? path : "build/mie.kernel");
+	const int failed = shared.optics_kernel ? cmocka_run_group_tests(tests, nullptr, nullptr) : 1;
+	kernel_destroy(shared.optics_kernel);
+	gl_context_destroy(shared.gl);
+	return failed;
+}

@@ -75,7 +75,8 @@ def test_layers_add_up_to_color(daemon, read_image, camera):
     total = sum(color(pixels, spec, part).astype(numpy.float64) for part in PARTS)
     whole = color(pixels, spec)
     assert numpy.all(numpy.isfinite(pixels))
-    assert all(color(pixels, spec, part).min() >= 0 for part in PARTS)
+    # A saturated colour of a single layer may lie just outside Rec.709.
+    assert all(color(pixels, spec, part).min() >= -1e-3 * whole.mean() for part in PARTS)
     assert numpy.allclose(total, whole, rtol=1e-3, atol=1e-5 * whole.max())
 
 

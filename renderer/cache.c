@@ -62,17 +62,26 @@ void cache_destroy(struct cache *cache)
 	free(cache);
 }
 
+/* What goes first: a result that takes half of the bound for itself (a huge picture) would drive out all that others share; else the least
+ * recently used. */
+static struct entry **next_to_drop(struct cache *cache)
+{
+	struct entry **oldest = NULL;
+	for (struct entry **link = &cache->first; *link; link = &(*link)->next) {
+		if ((*link)->frame == cache->frame)
+			continue;
+		if ((*link)->bytes > cache->bound / 2)
+			return link;
+		oldest = link;
+	}
+	return oldest;
+}
+
 static void shrink(struct cache *cache)
 {
-	while (cache->bytes > cache->bound) {
-		struct entry **oldest = NULL;
-		for (struct entry **link = &cache->first; *link; link = &(*link)->next)
-			if ((*link)->frame != cache->frame)
-				oldest = link;
-		if (!oldest)
-			return;
-		drop(cache, oldest);
-	}
+	struct entry **link;
+	while (cache->bytes > cache->bound && (link = next_to_drop(cache)))
+		drop(cache, link);
 }
 
 void cache_begin_frame(struct cache *cache)

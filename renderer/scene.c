@@ -79,3 +79,14 @@ double scene_dsd_liquid_water(const struct scene_dsd *dsd)
 	const double mean_r3 = rn_m * rn_m * rn_m * dsd->gamma * (dsd->gamma + 1) * (dsd->gamma + 2);
 	return 4.0 / 3.0 * M_PI * 1e6 * dsd->n0_per_cm3 * 1e6 * mean_r3;
 }
+
+double scene_ground_largest_reflectance(const struct scene_ground *ground)
+{
+	/* Of what shaders/lib/ground_paint.glsl paints. */
+	static const double painted[GROUND_TYPE_COUNT] = {
+		[GROUND_COUNTRY] = 0.20, [GROUND_SEA] = 0.07, [GROUND_SEA_ICE] = 0.79, [GROUND_SNOW] = 0.87};
+	double largest = painted[ground->type];
+	if (ground->type == GROUND_LAMBERT)
+		largest = fmax(ground->albedo[0], fmax(ground->albedo[1], ground->albedo[2]));
+	return largest * ground->albedo_scale;
+}

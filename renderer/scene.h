@@ -149,6 +149,9 @@ struct scene scene_default(void);
 /* Liquid water content of a droplet size distribution in g/m3: 4/3 pi rho N0 <r^3>, rho = 1e6 g/m3. Any thread. */
 double scene_dsd_liquid_water(const struct scene_dsd *dsd);
 
+/* Largest reflectance that a ground shows in any band, albedo_scale included; a scene's is at most 1. Any thread. */
+double scene_ground_largest_reflectance(const struct scene_ground *ground);
+
 /* Names as they stand in JSON, indexed by the enumerations above; every list ends in NULL. */
 extern const char *const scene_cloud_type_names[];
 extern const char *const scene_ground_type_names[];

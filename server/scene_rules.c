@@ -91,9 +91,9 @@ static void check_ground(struct scene_input *input, struct problem *problem)
 		/* One scene, one content: an unused albedo must not make two scenes of one. */
 		ground->albedo[0] = ground->albedo[1] = ground->albedo[2] = 0;
 	}
-	for (int i = 0; i < 3; i++)
-		if (ground->albedo[i] * ground->albedo_scale > 1)
-			problem_add(problem, "/ground/albedo_scale", "times the albedo exceeds 1");
+	if (scene_ground_largest_reflectance(ground) > 1)
+		problem_add(problem, "/ground/albedo_scale", "times the albedo exceeds 1: at most %.3g for this ground",
+			    ground->albedo_scale / scene_ground_largest_reflectance(ground));
 }
 
 static void check_camera(const struct scene_input *input, struct problem *problem)

@@ -191,42 +191,6 @@ static void result_destroy(void *value)
 	free(result);
 }
 
-static struct cache_key make_key(const struct scene *scene)
-{
-	const struct scene_clouds *clouds = &scene->clouds;
-	const double inputs[] = {scene->sun.elevation_deg,
-				 scene->sun.azimuth_deg,
-				 scene->dsd.n0_per_cm3,
-				 scene->dsd.gamma,
-				 scene->dsd.effective_radius_um,
-				 clouds->type,
-				 clouds->seed,
-				 clouds->time_s,
-				 clouds->coverage,
-				 clouds->base_m,
-				 clouds->thickness_m,
-				 clouds->tile_m,
-				 clouds->resolution,
-				 clouds->wind_mps[0],
-				 clouds->wind_mps[1],
-				 scene->ground.type,
-				 scene->ground.albedo[0],
-				 scene->ground.albedo[1],
-				 scene->ground.albedo[2],
-				 scene->ground.albedo_scale,
-				 scene->atmosphere.aerosol_optical_depth,
-				 scene->atmosphere.ozone_du,
-				 scene->radiosity.enabled,
-				 scene->radiosity.tolerance,
-				 scene->radiosity.max_passes,
-				 scene->model.shading,
-				 scene->model.optics};
-	struct cache_key key = cache_key_make("radiosity");
-	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
-		cache_key_add(&key, inputs[i]);
-	return key;
-}
-
 static struct result *result_compute(const struct radiosity_stage *stage, const struct scene *scene, const struct ground_maps *ground,
 				     const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab)
 {
@@ -257,7 +221,8 @@ bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_conte
 			 const struct ground_maps *ground, const struct sky_tables *sky, const struct field_maps *field,
 			 const struct slab_tables *slab, struct radiosity_light *light)
 {
-	const struct cache_key key = make_key(scene);
+	struct cache_key key = cache_key_make("radiosity");
+	stage_key_add_light(&key, scene);
 	struct result *result = cache_find(context->cache, &key);
 	if (!result) {
 		context->reused = false;

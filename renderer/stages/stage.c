@@ -16,6 +16,40 @@ void stage_read_texture(const struct texture *texture, int level, int components
 			  (GLsizei)((size_t)width * (size_t)height * (size_t)components * sizeof *values), values);
 }
 
+void stage_key_add_light(struct cache_key *key, const struct scene *scene)
+{
+	const struct scene_clouds *clouds = &scene->clouds;
+	const double inputs[] = {scene->sun.elevation_deg,
+				 scene->sun.azimuth_deg,
+				 scene->dsd.n0_per_cm3,
+				 scene->dsd.gamma,
+				 scene->dsd.effective_radius_um,
+				 clouds->type,
+				 clouds->seed,
+				 clouds->time_s,
+				 clouds->coverage,
+				 clouds->base_m,
+				 clouds->thickness_m,
+				 clouds->tile_m,
+				 clouds->resolution,
+				 clouds->wind_mps[0],
+				 clouds->wind_mps[1],
+				 scene->ground.type,
+				 scene->ground.albedo[0],
+				 scene->ground.albedo[1],
+				 scene->ground.albedo[2],
+				 scene->ground.albedo_scale,
+				 scene->atmosphere.aerosol_optical_depth,
+				 scene->atmosphere.ozone_du,
+				 scene->radiosity.enabled,
+				 scene->radiosity.tolerance,
+				 scene->radiosity.max_passes,
+				 scene->model.shading,
+				 scene->model.optics};
+	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
+		cache_key_add(key, inputs[i]);
+}
+
 bool stage_create_passes(const struct pass_compiler *compiler, const struct pass_desc *descs, struct pass **passes, int count)
 {
 	for (int i = 0; i < count; i++) {

@@ -26,6 +26,9 @@ void stage_upload_block(struct stage_context *context);
 /* Reads one level of a float texture back: `components` (1 or 4) floats a texel. Waits for the GPU: for small results alone. */
 void stage_read_texture(const struct texture *texture, int level, int components, float *values);
 
+/* Appends all of a scene that its light depends on: everything but camera and output. */
+void stage_key_add_light(struct cache_key *key, const struct scene *scene);
+
 /* Creates a list of passes; all or none. */
 bool stage_create_passes(const struct pass_compiler *compiler, const struct pass_desc *descs, struct pass **passes, int count);
 void stage_destroy_passes(struct pass **passes, int count);

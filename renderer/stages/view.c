@@ -103,7 +103,6 @@ void view_fill_block(struct scene_block *block, const struct scene *scene)
 
 static struct cache_key make_key(const struct scene *scene, enum layer layer)
 {
-	const struct scene_clouds *clouds = &scene->clouds;
 	const struct scene_camera *camera = &scene->camera;
 	const double inputs[] = {layer,
 				 scene->output.width,
@@ -115,37 +114,11 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 				 camera->elevation_deg,
 				 camera->roll_deg,
 				 camera->vertical_fov_deg,
-				 camera->projection,
-				 scene->sun.elevation_deg,
-				 scene->sun.azimuth_deg,
-				 scene->dsd.n0_per_cm3,
-				 scene->dsd.gamma,
-				 scene->dsd.effective_radius_um,
-				 clouds->type,
-				 clouds->seed,
-				 clouds->time_s,
-				 clouds->coverage,
-				 clouds->base_m,
-				 clouds->thickness_m,
-				 clouds->tile_m,
-				 clouds->resolution,
-				 clouds->wind_mps[0],
-				 clouds->wind_mps[1],
-				 scene->ground.type,
-				 scene->ground.albedo[0],
-				 scene->ground.albedo[1],
-				 scene->ground.albedo[2],
-				 scene->ground.albedo_scale,
-				 scene->atmosphere.aerosol_optical_depth,
-				 scene->atmosphere.ozone_du,
-				 scene->radiosity.enabled,
-				 scene->radiosity.tolerance,
-				 scene->radiosity.max_passes,
-				 scene->model.shading,
-				 scene->model.optics};
+				 camera->projection};
 	struct cache_key key = cache_key_make("view");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
+	stage_key_add_light(&key, scene);
 	return key;
 }
 

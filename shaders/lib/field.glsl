@@ -1,6 +1,7 @@
 // Thickness of the cloud layer at a place: interpolated field, detail, and only then the threshold, whose softness follows the footprint of the pixel.
 #ifndef SHADERS_LIB_FIELD
 #define SHADERS_LIB_FIELD
+#include "shaders/lib/bicubic.glsl"
 #include "shaders/lib/scene_block.glsl"
 
 #ifndef __cplusplus
@@ -11,23 +12,12 @@ uniform sampler2D field_detail;
 // Excess density, over its range, at which the edge of a cloud has half the thickness that its middle would have.
 const float FIELD_SKIRT = 0.06;
 
-// Cubic B-spline interpolation of a repeating texture out of four bilinear samples (Sigg and Hadwiger, GPU Gems 2, chapter 20).
 float field_bicubic(sampler2D field, vec2 uv, float size, float lod)
 {
-	vec2 p = uv * size - 0.5;
-	vec2 base = floor(p);
-	vec2 f = p - base;
-	vec2 f2 = f * f;
-	vec2 f3 = f2 * f;
-	vec2 w0 = (1.0 - 3.0 * f + 3.0 * f2 - f3) * (1.0 / 6.0);
-	vec2 w1 = (4.0 - 6.0 * f2 + 3.0 * f3) * (1.0 / 6.0);
-	vec2 w3 = f3 * (1.0 / 6.0);
-	vec2 g0 = w0 + w1;
-	vec2 h0 = (base + w1 / g0 - 0.5) / size;
-	vec2 h1 = (base + 1.5 + w3 / (1.0 - g0)) / size;
-	float a = mix(textureLod(field, vec2(h1.x, h0.y), lod).x, textureLod(field, h0, lod).x, g0.x);
-	float b = mix(textureLod(field, h1, lod).x, textureLod(field, vec2(h0.x, h1.y), lod).x, g0.x);
-	return mix(b, a, g0.y);
+	bicubic_samples s = bicubic_at(uv, size);
+	float a = mix(textureLod(field, vec2(s.far.x, s.near.y), lod).x, textureLod(field, s.near, lod).x, s.share.x);
+	float b = mix(textureLod(field, s.far, lod).x, textureLod(field, vec2(s.near.x, s.far.y), lod).x, s.share.x);
+	return mix(b, a, s.share.y);
 }
 
 // The field before its threshold. place: metres east and north of the tile's corner; footprint: size of the pixel there, m.

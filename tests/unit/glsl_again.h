@@ -1,6 +1,7 @@
 /* Undefines the guards of shaders/lib, so that the next include compiles the library once more, in another namespace. No guard of its
  * own. */
 #undef SHADERS_LIB_ATMOSPHERE
+#undef SHADERS_LIB_BICUBIC
 #undef SHADERS_LIB_CAMERA
 #undef SHADERS_LIB_COLOUR
 #undef SHADERS_LIB_FIELD

@@ -48,18 +48,18 @@ double exchange_level_transform(double wave_number_per_m, double texel_m, int le
 	return sum / DIRECTIONS;
 }
 
-enum { WAVES = 96 };
+/* The last level, the mean, has no waves: it takes what the others leave of the sum, and is not fitted. */
+enum { WAVES = 96, FITTED = EXCHANGE_LEVELS - 1 };
 
 /* Non-negative least squares by coordinate descent on the normal equations, which are small and well scaled. */
-static void solve_nonnegative(const double matrix[EXCHANGE_LEVELS][EXCHANGE_LEVELS], const double right[EXCHANGE_LEVELS],
-			      double solution[EXCHANGE_LEVELS])
+static void solve_nonnegative(const double matrix[FITTED][FITTED], const double right[FITTED], double solution[FITTED])
 {
-	memset(solution, 0, EXCHANGE_LEVELS * sizeof *solution);
+	memset(solution, 0, FITTED * sizeof *solution);
 	for (int sweep = 0; sweep < 20000; sweep++) {
 		double change = 0;
-		for (int i = 0; i < EXCHANGE_LEVELS; i++) {
+		for (int i = 0; i < FITTED; i++) {
 			double rest = right[i];
-			for (int j = 0; j < EXCHANGE_LEVELS; j++)
+			for (int j = 0; j < FITTED; j++)
 				rest -= j == i ? 0 : matrix[i][j] * solution[j];
 			const double next = fmax(0, rest / matrix[i][i]);
 			change = fmax(change, fabs(next - solution[i]));
@@ -73,26 +73,25 @@ static void solve_nonnegative(const double matrix[EXCHANGE_LEVELS][EXCHANGE_LEVE
 void exchange_weights(double tile_m, double distance_m, double weights[EXCHANGE_LEVELS])
 {
 	const double texel_m = tile_m / EXCHANGE_SIDE;
-	double matrix[EXCHANGE_LEVELS][EXCHANGE_LEVELS] = {{0}}, right[EXCHANGE_LEVELS] = {0};
-	for (int w = 0; w <= WAVES; w++) {
-		/* From the tile's own wave number to that of two texels, evenly in its logarithm, and k = 0 (the sum of the weights) above
-		 * all. */
-		const double k = w == WAVES ? 0 : 2 * M_PI / tile_m * pow(EXCHANGE_SIDE / 2.0, (double)w / (WAVES - 1));
-		const double importance = w == WAVES ? 1e4 : 1;
+	double matrix[FITTED][FITTED] = {{0}}, right[FITTED] = {0};
+	for (int w = 0; w < WAVES; w++) {
+		/* From the tile's own wave number to that of two texels, evenly in its logarithm. */
+		const double k = 2 * M_PI / tile_m * pow(EXCHANGE_SIDE / 2.0, (double)w / (WAVES - 1));
 		const double wanted = exchange_kernel_transform(k, distance_m);
-		double basis[EXCHANGE_LEVELS];
-		for (int i = 0; i < EXCHANGE_LEVELS; i++)
+		double basis[FITTED];
+		for (int i = 0; i < FITTED; i++)
 			basis[i] = exchange_level_transform(k, texel_m, i);
-		for (int i = 0; i < EXCHANGE_LEVELS; i++) {
-			right[i] += importance * basis[i] * wanted;
-			for (int j = 0; j < EXCHANGE_LEVELS; j++)
-				matrix[i][j] += importance * basis[i] * basis[j];
+		for (int i = 0; i < FITTED; i++) {
+			right[i] += basis[i] * wanted;
+			for (int j = 0; j < FITTED; j++)
+				matrix[i][j] += basis[i] * basis[j];
 		}
 	}
 	solve_nonnegative(matrix, right, weights);
 	double sum = 0;
-	for (int i = 0; i < EXCHANGE_LEVELS; i++)
+	for (int i = 0; i < FITTED; i++)
 		sum += weights[i];
-	for (int i = 0; i < EXCHANGE_LEVELS; i++)
+	weights[FITTED] = fmax(0, 1 - sum);
+	for (int i = 0; sum > 1 && i < FITTED; i++)
 		weights[i] /= sum;
 }

@@ -1,0 +1,107 @@
+/* The cache: what is found, what is dropped first, what a frame in work holds on to. */
+#include "renderer/cache.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+static int destroyed[16];
+
+static void destroy(void *value)
+{
+	++*(int *)value;
+}
+
+static struct cache_key key_of(double number)
+{
+	struct cache_key key = cache_key_make("test");
+	cache_key_add(&key, number);
+	return key;
+}
+
+static void keep(struct cache *cache, int number, size_t bytes)
+{
+	const struct cache_key key = key_of(number);
+	destroyed[number] = 0;
+	assert_true(cache_keep(cache, &key, &destroyed[number], bytes, destroy));
+}
+
+static void *find(struct cache *cache, int number)
+{
+	const struct cache_key key = key_of(number);
+	return cache_find(cache, &key);
+}
+
+static void keys_tell_apart(void **state)
+{
+	(void)state;
+	struct cache *cache = cache_create(1000);
+	cache_begin_frame(cache);
+	keep(cache, 1, 10);
+	assert_ptr_equal(find(cache, 1), &destroyed[1]);
+	assert_null(find(cache, 2));
+	const struct cache_key other = cache_key_make("tess"), shorter = cache_key_make("test");
+	assert_null(cache_find(cache, &other));
+	assert_null(cache_find(cache, &shorter));
+	/* Minus zero is zero. */
+	keep(cache, 0, 10);
+	const struct cache_key minus = key_of(-0.0);
+	assert_ptr_equal(cache_find(cache, &minus), &destroyed[0]);
+	assert_int_equal(cache_bytes(cache), 20);
+	cache_destroy(cache);
+	assert_int_equal(destroyed[0], 1);
+	assert_int_equal(destroyed[1], 1);
+	cache_destroy(NULL);
+}
+
+static void least_recently_used_goes_first(void **state)
+{
+	(void)state;
+	struct cache *cache = cache_create(100);
+	for (int i = 0; i < 3; i++) {
+		cache_begin_frame(cache);
+		keep(cache, i, 30);
+	}
+	cache_begin_frame(cache);
+	assert_non_null(find(cache, 0)); /* used again, so 1 is the oldest */
+	cache_begin_frame(cache);
+	keep(cache, 3, 30);
+	assert_int_equal(destroyed[1], 1);
+	assert_int_equal(destroyed[0] + destroyed[2] + destroyed[3], 0);
+	assert_null(find(cache, 1));
+	assert_non_null(find(cache, 0));
+	assert_int_equal(cache_bytes(cache), 90);
+	cache_destroy(cache);
+}
+
+static void a_frame_holds_what_it_uses(void **state)
+{
+	(void)state;
+	struct cache *cache = cache_create(50);
+	cache_begin_frame(cache);
+	keep(cache, 0, 40);
+	cache_begin_frame(cache);
+	assert_non_null(find(cache, 0)); /* found in this frame, so kept through it */
+	keep(cache, 1, 40);
+	keep(cache, 2, 500);
+	assert_int_equal(destroyed[0] + destroyed[1] + destroyed[2], 0);
+	assert_int_equal(cache_bytes(cache), 580);
+	/* The next frame frees what is beyond the bound. */
+	cache_begin_frame(cache);
+	assert_true(cache_bytes(cache) <= 50);
+	cache_destroy(cache);
+	for (int i = 0; i < 3; i++)
+		assert_int_equal(destroyed[i], 1);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(keys_tell_apart),
+		cmocka_unit_test(least_recently_used_goes_first),
+		cmocka_unit_test(a_frame_holds_what_it_uses),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

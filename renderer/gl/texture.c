@@ -51,6 +51,18 @@ void texture_build_mipmaps(const struct texture *texture)
 	glGenerateTextureMipmap(texture->id);
 }
 
+struct texture texture_level(const struct texture *texture, int level)
+{
+	struct texture view = {.levels = 1, .format = texture->format};
+	view.width = texture->width >> level > 0 ? texture->width >> level : 1;
+	view.height = texture->height >> level > 0 ? texture->height >> level : 1;
+	glGenTextures(1, &view.id);
+	glTextureView(view.id, GL_TEXTURE_2D, texture->id, formats[texture->format].internal, (GLuint)level, 1, 0, 1);
+	glTextureParameteri(view.id, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+	glTextureParameteri(view.id, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+	return view;
+}
+
 size_t texture_bytes(const struct texture *texture)
 {
 	size_t bytes = 0;

@@ -29,6 +29,10 @@ void texture_upload(const struct texture *texture, const float *values);
 /* Fills the other levels with box-filtered ones. */
 void texture_build_mipmaps(const struct texture *texture);
 
+/* One level as a texture of its own, repeating and unfiltered, over the same memory: so that it can be read while another level is written.
+ * The caller finishes it, before or after the whole. */
+struct texture texture_level(const struct texture *texture, int level);
+
 /* Bytes of all levels. */
 size_t texture_bytes(const struct texture *texture);
 

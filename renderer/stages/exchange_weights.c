@@ -33,17 +33,23 @@ static double sinc(double x)
 	return fabs(x) < 1e-6 ? 1 : sin(x) / x;
 }
 
+/* Along one axis, at half a wave's phase over a texel of level 0. Each reduction is (1 + 1)^3/8, whose transform is the cube of a cosine;
+ * the product of the cosines up to a level is a ratio of two sinc. */
+static double axis_transform(double half, int level)
+{
+	const double box = sinc(half), read = sinc(half * (1 << level)), reduced = fabs(box) > 1e-9 ? read / box : 0;
+	return box * reduced * reduced * reduced * read * read * read * read;
+}
+
 double exchange_level_transform(double wave_number_per_m, double texel_m, int level)
 {
 	enum { DIRECTIONS = 8 };
 	if (level == EXCHANGE_LEVELS - 1) /* the mean over the tile */
 		return wave_number_per_m == 0;
-	const double half = 0.5 * wave_number_per_m * texel_m * (1 << level);
 	double sum = 0;
 	for (int i = 0; i < DIRECTIONS; i++) {
-		const double azimuth = (i + 0.5) * M_PI / 2 / DIRECTIONS;
-		const double s = sinc(half * cos(azimuth)) * sinc(half * sin(azimuth));
-		sum += s * s * s * s * s;
+		const double azimuth = (i + 0.5) * M_PI / 2 / DIRECTIONS, half = 0.5 * wave_number_per_m * texel_m;
+		sum += axis_transform(half * cos(azimuth), level) * axis_transform(half * sin(azimuth), level);
 	}
 	return sum / DIRECTIONS;
 }
@@ -78,13 +84,15 @@ void exchange_weights(double tile_m, double distance_m, double weights[EXCHANGE_
 		/* From the tile's own wave number to that of two texels, evenly in its logarithm. */
 		const double k = 2 * M_PI / tile_m * pow(EXCHANGE_SIDE / 2.0, (double)w / (WAVES - 1));
 		const double wanted = exchange_kernel_transform(k, distance_m);
+		/* Waves of a square emitter fall off as k^-3/2, and their number grows with k: long ones count most. */
+		const double importance = pow(k * tile_m / (2 * M_PI), -1.5);
 		double basis[FITTED];
 		for (int i = 0; i < FITTED; i++)
 			basis[i] = exchange_level_transform(k, texel_m, i);
 		for (int i = 0; i < FITTED; i++) {
-			right[i] += basis[i] * wanted;
+			right[i] += importance * basis[i] * wanted;
 			for (int j = 0; j < FITTED; j++)
-				matrix[i][j] += basis[i] * basis[j];
+				matrix[i][j] += importance * basis[i] * basis[j];
 		}
 	}
 	solve_nonnegative(matrix, right, weights);

@@ -19,7 +19,7 @@ static const struct pass_desc pass_descs[FIELD_PASS_COUNT] = {
 /* HEIGHT_SIDE as in shaders/lib/height.glsl, DETAIL_SIDE as in shaders/lib/field.glsl. */
 enum { DETAIL_SIDE = 512, HEIGHT_SIDE = 1024, HISTOGRAM_BINS = 4096 };
 
-/* Densities are sums of noise of unit variance with weights below 1: nothing lies outside. */
+/* Densities are sums of noise within -3..3 and cells within 0..1, with weights below 1: nothing lies outside. */
 static const double density_lowest = -5, density_highest = 6;
 
 /* What the types differ in beside the noise itself. */
@@ -212,17 +212,11 @@ static void fill_threshold(struct scene_block *block, const struct scene_clouds 
 	block->cloud_threshold[2] = (float)shapes[clouds->type].exponent;
 }
 
-/* Level 0 from the heights, each further level from the one below it. That one is read through a view of it alone: levels that are being
- * written must not be within a sampler's reach, nor, where images are written, outside the texture's own. */
+/* Level 0 from the heights, each further level from the one below it, read through a view of it alone: levels that are being written must
+ * not be within a sampler's reach. */
 static void maximum_level(const struct field_stage *stage, struct height_field *field, int level)
 {
-	struct texture below = field->height;
-	if (level > 0) {
-		below = field->maximum;
-		glGenTextures(1, &below.id);
-		glTextureView(below.id, GL_TEXTURE_2D, field->maximum.id, texture_internal_format(field->maximum.format),
-			      (GLuint)(level - 1), 1, 0, 1);
-	}
+	struct texture below = level == 0 ? field->height : texture_level(&field->maximum, level - 1);
 	pass_run(stage->passes[PASS_MAXIMUM], &(struct pass_run){.targets = (struct texture *[]){&field->maximum},
 								 .level = level,
 								 .samplers = {&below},

@@ -14,7 +14,7 @@ struct ground_stage {
 
 struct ground_maps {
 	const struct texture *map;    /* reflectance per band (650, 550, 450 nm), 0..1 */
-	const struct texture *relief; /* noise of unit variance for what lies close by */
+	const struct texture *relief; /* noise, within -2..2, for what lies close by */
 	double mean[3];               /* of the map */
 };
 

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { PASS_SOURCES, PASS_START, PASS_EXCHANGE, PASS_CLOSE };
+enum { PASS_SOURCES, PASS_START, PASS_EXCHANGE, PASS_CLOSE, PASS_REDUCE };
 
 static const struct pass_desc pass_descs[RADIOSITY_PASS_COUNT] = {
 	[PASS_SOURCES] = {.file = "shaders/passes/radiosity_sources.glsl",
@@ -24,6 +24,7 @@ static const struct pass_desc pass_descs[RADIOSITY_PASS_COUNT] = {
 			.outputs = 2,
 			.samplers = {"ground_received", "cloud_received", "ground_sends", "cloud_sends", "ground_albedo_plane",
 				     "cloud_albedo_plane"}},
+	[PASS_REDUCE] = {.file = "shaders/passes/radiosity_reduce.glsl", .outputs = 2, .samplers = {"first_below", "second_below"}},
 };
 
 /* The four moving planes exist twice, read from one set and written to the other. */
@@ -39,6 +40,19 @@ struct result {
 	double ground_diffuse[3], ground_direct[3], residual;
 	int passes;
 };
+
+void radiosity_build_levels(const struct pass *reduce, struct texture *first, struct texture *second)
+{
+	for (int level = 1; level < EXCHANGE_LEVELS; level++) {
+		struct texture below[2] = {texture_level(first, level - 1), texture_level(second, level - 1)};
+		pass_run(reduce, &(struct pass_run){.targets = (struct texture *[]){first, second},
+						    .level = level,
+						    .samplers = {&below[0], &below[1]},
+						    .arguments = {{(float)(EXCHANGE_SIDE >> (level - 1))}}});
+		texture_finish(&below[0]);
+		texture_finish(&below[1]);
+	}
+}
 
 bool radiosity_stage_init(struct radiosity_stage *stage, const struct pass_compiler *compiler)
 {
@@ -100,8 +114,10 @@ static void run_sources(const struct radiosity_stage *stage, struct planes *plan
 	pass_run(stage->passes[PASS_SOURCES], &(struct pass_run){.targets = targets,
 								 .samplers = {sky->transmittance, field->coarse, field->detail, &slab->sun,
 									      ground->map, ground->relief}});
-	for (int i = 0; i < 4; i++)
-		texture_build_mipmaps(targets[i]);
+	/* The source is spread out by its levels; of the others only the means are asked for. */
+	radiosity_build_levels(stage->passes[PASS_REDUCE], &planes->source, &planes->cloud_albedo);
+	texture_build_mipmaps(&planes->ground_albedo);
+	texture_build_mipmaps(&planes->ground_direct);
 }
 
 static void run_exchange(const struct radiosity_stage *stage, struct planes *planes, int kind, int from, const struct pass_run *weights)
@@ -119,8 +135,8 @@ static void run_exchange(const struct radiosity_stage *stage, struct planes *pla
 	pass_run(stage->passes[kind], &run);
 	/* Closing makes no further light to send; the ground's mean is always asked for. */
 	texture_build_mipmaps(targets[GROUND_RECEIVED]);
-	for (int i = GROUND_SENDS; kind != PASS_CLOSE && i < PLANE_COUNT; i++)
-		texture_build_mipmaps(targets[i]);
+	if (kind != PASS_CLOSE)
+		radiosity_build_levels(stage->passes[PASS_REDUCE], targets[GROUND_SENDS], targets[CLOUD_SENDS]);
 }
 
 static void mean_of(const struct texture *plane, double mean[3])
@@ -156,8 +172,8 @@ static void compute(const struct radiosity_stage *stage, struct planes *planes, 
 	start.samplers[1] = &planes->ground_albedo;
 	start.samplers[2] = &planes->ground_direct;
 	pass_run(stage->passes[PASS_START], &start);
-	for (int i = 0; i < PLANE_COUNT; i++)
-		texture_build_mipmaps(targets[i]);
+	texture_build_mipmaps(targets[GROUND_RECEIVED]);
+	radiosity_build_levels(stage->passes[PASS_REDUCE], targets[GROUND_SENDS], targets[CLOUD_SENDS]);
 
 	int at = 0;
 	const int most = scene->radiosity.enabled ? scene->radiosity.max_passes : 0;

@@ -11,7 +11,7 @@
 #include "renderer/stages/ground.h"
 #include "renderer/stages/sky.h"
 
-enum { RADIOSITY_PASS_COUNT = 4 };
+enum { RADIOSITY_PASS_COUNT = 5 };
 
 struct radiosity_stage {
 	struct pass *passes[RADIOSITY_PASS_COUNT];
@@ -25,6 +25,10 @@ struct radiosity_light {
 	int passes;
 	double residual; /* what was on its way when the exchange stopped, over all that the ground receives */
 };
+
+/* Fills the levels above 0 of two planes of EXCHANGE_SIDE with `reduce`, the pass radiosity_reduce.glsl, as exchange_weights expects them.
+ */
+void radiosity_build_levels(const struct pass *reduce, struct texture *first, struct texture *second);
 
 bool radiosity_stage_init(struct radiosity_stage *stage, const struct pass_compiler *compiler);
 void radiosity_stage_finish(struct radiosity_stage *stage);

@@ -42,7 +42,7 @@ float noise_corner(int x, int y, int period, uint seed, float turns, vec2 offset
 	return dot(vec2(cos(angle), sin(angle)), offset);
 }
 
-// Gradient noise of unit variance (nearly) on a lattice of unit cells that repeats after `period` cells. turns: how often gradients have turned.
+// Gradient noise on a lattice of unit cells that repeats after `period` cells. turns: how often gradients have turned.
 float noise_gradient(vec2 p, int period, uint seed, float turns)
 {
 	vec2 cell = floor(p);
@@ -54,12 +54,12 @@ float noise_gradient(vec2 p, int period, uint seed, float turns)
 	float b = noise_corner(x + 1, y, period, seed, turns, f - vec2(1.0, 0.0));
 	float c = noise_corner(x, y + 1, period, seed, turns, f - vec2(0.0, 1.0));
 	float d = noise_corner(x + 1, y + 1, period, seed, turns, f - vec2(1.0, 1.0));
-	// 3.9: reciprocal standard deviation of gradient noise with unit gradients and quintic weights.
+	// 3.9 brings the variance to 0.71, so that hardly a value lies outside -2..2; the weights of the fields are chosen with it.
 	return 3.9 * mix(mix(a, b, w.x), mix(c, d, w.x), w.y);
 }
 
 // Sum of octaves from `period` cells a tile, each twice as fine; gain 2^(-1/3) an octave is the k^(-8/3) spectrum in the plane (k^(-5/3) along a line)
-// of liquid water in stratiform cloud. Unit variance. p in tiles. Small eddies turn faster, as size to the power of 2/3.
+// of liquid water in stratiform cloud. Variance 0.71, whatever the number of octaves. p in tiles. Small eddies turn faster, as size to the power of 2/3.
 float noise_turbulence(vec2 p, int period, int octaves, uint seed, float turns)
 {
 	float sum = 0.0;

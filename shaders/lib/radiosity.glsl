@@ -1,6 +1,6 @@
 // Exchange of diffuse light between the cloud base and the ground, parallel planes of one periodic tile.
 //
-// The kernel between them, h^2 / (pi (h^2 + d^2)^2), is a sum of smooth kernels of growing size: cubic B-splines on the levels of a mip pyramid, whose weights
+// The kernel between them, h^2 / (pi (h^2 + d^2)^2), is a sum of smooth kernels of growing size: cubic B-splines on the levels of a pyramid (shaders/passes/radiosity_reduce.glsl), whose weights
 // the processor fits to the kernel's transform (renderer/stages/exchange_weights.h). They sum to 1: nothing is created or lost.
 #ifndef SHADERS_LIB_RADIOSITY
 #define SHADERS_LIB_RADIOSITY

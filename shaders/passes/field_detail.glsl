@@ -1,4 +1,4 @@
-// Detail below the texel of the coarse field, over a small tile of its own, continuing the same spectrum. Unit variance.
+// Detail below the texel of the coarse field, over a small tile of its own, continuing the same spectrum.
 #include "shaders/lib/noise.glsl"
 
 void pass(ivec2 pixel)

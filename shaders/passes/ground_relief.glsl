@@ -1,4 +1,4 @@
-// Tufts, clods and ripples: noise of unit variance over a small tile. arguments[0].x: its side in texels.
+// Tufts, clods and ripples: noise over a small tile. arguments[0].x: its side in texels.
 #include "shaders/lib/noise.glsl"
 
 void pass(ivec2 pixel)

@@ -6,7 +6,7 @@
 #include "shaders/lib/sky_table.glsl"
 
 const int STEPS_NEAR = 20;
-const int STEPS_FAR = 28;
+const int STEPS_FAR = 32;
 
 // Distance to the cloud layer (its base from below, its top from above), negative when the ray does not reach it.
 float layer_distance(float h, float mu, float to_ground)
@@ -36,7 +36,7 @@ void pass(ivec2 pixel)
 	airlight light;
 	light.radiance = vec3(0.0);
 	light.transmittance = vec3(1.0);
-	light = scattering_walk(light, h, mu, mu_sun, cos_angle, 0.0, split, STEPS_NEAR);
+	light = scattering_walk(light, h, mu, mu_sun, cos_angle, 0.0, split, split < end ? STEPS_NEAR : STEPS_NEAR + STEPS_FAR);
 	airlight near_light = light;
 	if (split < end)
 		light = scattering_walk(light, h, mu, mu_sun, cos_angle, split, end, STEPS_FAR);

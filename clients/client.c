@@ -30,8 +30,8 @@ static int set_timeout(struct client *client, const char *text)
 {
 	char *end;
 	const double seconds = strtod(text, &end);
-	if (end == text || *end || !(seconds >= 0.001 && seconds <= 86400)) {
-		client_error("--timeout wants seconds, 0.001 to 86400, not \"%s\"", text);
+	if (end == text || *end || !(seconds >= 0.001 && seconds <= 3600)) { /* the daemon takes no more */
+		client_error("--timeout wants seconds, 0.001 to 3600, not \"%s\"", text);
 		return CLIENT_USAGE;
 	}
 	client->timeout_s = seconds;

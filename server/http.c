@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -35,6 +36,12 @@ static bool allows(const struct route *route, const char *method)
 	return false;
 }
 
+static bool is_encoded(const struct request *request)
+{
+	const char *encoding = request_header(request, "Content-Encoding");
+	return encoding && *encoding && strcasecmp(encoding, "identity") != 0;
+}
+
 static bool announces_too_much(const struct request *request)
 {
 	const char *length = request_header(request, "Content-Length");
@@ -57,6 +64,8 @@ static enum MHD_Result begin(struct request *request, const char *method)
 	if (request->is_post && !negotiation_is_json(request_header(request, "Content-Type")))
 		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE,
 						 "The body must be JSON, sent as Content-Type: application/json.");
+	if (request->is_post && is_encoded(request))
+		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE, "The body must be sent without a Content-Encoding.");
 	if (announces_too_much(request))
 		return response_send_new_problem(request, PROBLEM_TOO_LARGE, "A body has at most %d bytes.", REQUEST_BODY_MAX);
 	return MHD_YES;
@@ -105,7 +114,9 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	enum metrics_route route = request->route ? request->route->metrics : ROUTE_OTHER;
 	bool probe = route == ROUTE_HEALTHZ || route == ROUTE_READYZ || route == ROUTE_METRICS;
 	metrics_count_request(service->metrics, route, status, took);
-	log_line(probe ? LOG_DEBUG : LOG_INFO, "%s %.200s %u %.1f ms %s", request->method, request->path, status, took, request->id);
+	/* Without a method: the headers never came, or libmicrohttpd refused them by itself. */
+	log_line(probe ? LOG_DEBUG : LOG_INFO, "%s %.200s %u %.1f ms %s", *request->method ? request->method : "-", request->path, status,
+		 took, *request->id ? request->id : "-");
 	if (request->is_accepted)
 		service->in_flight--;
 	request_destroy(request);
@@ -121,11 +132,17 @@ static void on_library_log(void *context, const char *format, va_list args)
 	log_debug("libmicrohttpd: %s", text);
 }
 
+/* getaddrinfo would cut a larger number to 16 bits. */
+static bool is_port(const char *text)
+{
+	return text[strspn(text, "0123456789")] == '\0' && strtoul(text, NULL, 10) <= 65535;
+}
+
 /* Splits HOST:PORT or [IPv6]:PORT. */
 static bool split_address(const char *listen, char *host, size_t size, const char **port)
 {
 	const char *colon = strrchr(listen, ':');
-	if (!colon || !colon[1])
+	if (!colon || !colon[1] || !is_port(colon + 1))
 		return false;
 	size_t length = (size_t)(colon - listen);
 	if (length >= 2 && listen[0] == '[' && colon[-1] == ']') {
@@ -148,7 +165,7 @@ static struct addrinfo *resolve(const char *listen, char *host, size_t size)
 	struct addrinfo *addresses = NULL;
 	const char *port;
 	if (!split_address(listen, host, size, &port)) {
-		log_error("--listen %s: must be HOST:PORT or [IPv6]:PORT", listen);
+		log_error("--listen %s: must be HOST:PORT or [IPv6]:PORT, PORT from 0 to 65535", listen);
 		return NULL;
 	}
 	int error = getaddrinfo(host, port, &hints, &addresses);

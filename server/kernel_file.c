@@ -25,6 +25,13 @@ static bool make_directories(const char *path)
 	return mkdir(part, 0755) == 0 || errno == EEXIST;
 }
 
+/* Known before the table is computed rather than after. */
+static bool can_write(const char *directory)
+{
+	char inside[PATH_MAX];
+	return snprintf(inside, sizeof inside, "%s/.", directory) < (int)sizeof inside && access(inside, W_OK | X_OK) == 0;
+}
+
 static bool beside_program(char path[static PATH_MAX])
 {
 	ssize_t length = readlink("/proc/self/exe", path, PATH_MAX - 1);
@@ -68,5 +75,11 @@ struct kernel *kernel_file_open(const char *path, const char *state_dir)
 	}
 	if (access(buffer, R_OK) == 0)
 		kernel = kernel_load(buffer);
-	return kernel ? kernel : generate(buffer);
+	if (kernel)
+		return kernel;
+	if (!can_write(state_dir)) {
+		log_error("state directory %s, for the Mie kernel table: %s", state_dir, strerror(errno));
+		return NULL;
+	}
+	return generate(buffer);
 }

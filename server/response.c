@@ -27,13 +27,18 @@ void response_set(struct MHD_Response *response, const char *name, const char *v
 		log_error("response header %s could not be set", name);
 }
 
+static void format_timing(struct request *request, char timing[static SERVER_TIMING_SIZE])
+{
+	timings_set(&request->timings, TIMING_TOTAL, clock_now_ms() - request->started_ms);
+	timings_format(&request->timings, timing);
+}
+
 enum MHD_Result response_send(struct request *request, unsigned status, struct MHD_Response *response)
 {
 	if (!response)
 		return MHD_NO;
 	char timing[SERVER_TIMING_SIZE];
-	timings_set(&request->timings, TIMING_TOTAL, clock_now_ms() - request->started_ms);
-	timings_format(&request->timings, timing);
+	format_timing(request, timing);
 	response_set(response, "Server-Timing", timing);
 	response_set(response, "Timing-Allow-Origin", "*");
 	response_set(response, "X-Request-Id", request->id);
@@ -120,13 +125,16 @@ enum MHD_Result response_refuse_body(struct request *request)
 {
 	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
 	struct text answer = {0};
+	char timing[SERVER_TIMING_SIZE];
+	format_timing(request, timing);
 	problem_set(&request->problem, PROBLEM_TOO_LARGE, "A body has at most %d bytes.", REQUEST_BODY_MAX);
 	char *body = problem_to_json(&request->problem, request->id, 0);
 	if (body && info) {
 		text_printf(&answer,
 			    "HTTP/1.1 413 Content Too Large\r\nContent-Type: application/problem+json\r\nContent-Length: %zu\r\n"
-			    "Cache-Control: " CACHE_NONE "\r\nX-Request-Id: %s\r\nConnection: close\r\n\r\n%s",
-			    strlen(body), request->id, body);
+			    "Cache-Control: " CACHE_NONE "\r\nServer-Timing: %s\r\nTiming-Allow-Origin: *\r\nX-Request-Id: %s\r\n"
+			    "Connection: close\r\n\r\n%s",
+			    strlen(body), timing, request->id, body);
 		/* The answer is far smaller than a socket's buffer; a client that reads nothing gets nothing. */
 		if (!answer.failed && send(info->connect_fd, answer.data, answer.length, MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
 			request->status = problem_status(PROBLEM_TOO_LARGE);

@@ -138,8 +138,24 @@ def test_address_in_use(start_daemon, tmp_path):
 
 
 def test_bad_address(tmp_path):
-    for listen in ("nowhere", "127.0.0.1:", "1.2.3.4.5:80", "::1:80"):
+    for listen in ("nowhere", "127.0.0.1:", "1.2.3.4.5:80", "::1:80", "127.0.0.1:65536", "127.0.0.1:99999", "127.0.0.1: 80"):
         assert run("--listen", listen, "--state-dir", str(tmp_path)).returncode == 1
+
+
+def test_state_directory_is_tried_before_the_table_is_computed(tmp_path):
+    state = tmp_path / "state"
+    state.write_text("a file")
+    result = run("--listen", "127.0.0.1:0", "--state-dir", str(state), "--kernel", str(tmp_path / "none"))
+    assert result.returncode == 1
+    assert f"state directory {state}" in result.stderr
+    assert "computing" not in result.stderr
+
+
+def test_log_of_a_request_that_cannot_be_read(start_daemon):
+    daemon = start_daemon()
+    with socket.create_connection(("127.0.0.1", daemon.port), timeout=60) as client:
+        client.sendall(b"GET /somewhere HTTP/1.1\r\nHos")
+    assert wait_for(lambda: " - /somewhere 499 " in daemon.log.read_text())
 
 
 def test_ipv6(tmp_path):

@@ -70,10 +70,23 @@ static void read_query(struct request *request, struct scene_input *input)
 	query_finish(&query);
 }
 
+/* A scene comes in one place: what stands in the other would go unheard. */
+static void refuse_the_other_place(struct request *request)
+{
+	if (request->is_post && request->query && *request->query)
+		problem_set(&request->problem, PROBLEM_BAD_REQUEST, "The scene of a POST is its body, so its address takes no query.");
+	if (!request->is_post && request->body.length > 0)
+		problem_set(&request->problem, PROBLEM_BAD_REQUEST,
+			    "The scene of a GET is its query, so it takes no body: send that by POST.");
+}
+
 /* Fills request->problem when there is no such picture to be had. */
 static void read_scene(struct request *request, struct scene_input *input)
 {
 	*input = scene_input_default();
+	refuse_the_other_place(request);
+	if (request->problem.kind != PROBLEM_NONE)
+		return;
 	if (request->is_post)
 		read_body(request, input);
 	else
@@ -163,13 +176,10 @@ static enum MHD_Result finish(struct request *request)
 	timings_set(&request->timings, TIMING_QUEUE, work->job.waited_ms);
 	switch (work->job.outcome) {
 	case RENDER_OUTCOME_EXPIRED:
-		metrics_count_end(metrics, ENDED_EXPIRED);
 		return response_send_new_problem(request, PROBLEM_DEADLINE, "The image was not ready within its deadline.");
 	case RENDER_OUTCOME_ABANDONED:
-		metrics_count_end(metrics, ENDED_ABANDONED);
 		return MHD_NO;
 	case RENDER_OUTCOME_FAILED:
-		metrics_count_end(metrics, ENDED_FAILED);
 		return response_send_new_problem(request, PROBLEM_RENDER_FAILED,
 						 "The image could not be made. The log has the reason under %s.", request->id);
 	case RENDER_OUTCOME_OK:
@@ -192,6 +202,17 @@ static bool is_abandoned(struct render_job *job)
 	return work->request->service->giving_up || request_is_abandoned(work->request);
 }
 
+/* Counted here and not in `finish`, which libmicrohttpd does not call for a connection that it finds closed. */
+static void hand_back(struct render_work *work)
+{
+	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
+						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
+						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
+	if (work->job.outcome != RENDER_OUTCOME_OK)
+		metrics_count_end(work->request->service->metrics, ends[work->job.outcome]);
+	request_resume(work->request);
+}
+
 static void encode(struct work *base)
 {
 	struct render_work *work = (struct render_work *)((char *)base - offsetof(struct render_work, encode));
@@ -205,11 +226,13 @@ static void encode(struct work *base)
 							   sizeof error)) {
 		log_error("request %s: encoding failed: %s", work->request->id, error);
 		work->job.outcome = RENDER_OUTCOME_FAILED;
+	} else if (clock_now_ms() >= work->job.deadline_ms) {
+		work->job.outcome = RENDER_OUTCOME_EXPIRED;
 	}
 	work->encode_ms = clock_now_ms() - start;
 	free(work->job.frame.pixels);
 	work->job.frame.pixels = NULL;
-	request_resume(work->request);
+	hand_back(work);
 }
 
 static void on_rendered(struct render_job *job)
@@ -220,7 +243,7 @@ static void on_rendered(struct render_job *job)
 	if (job->outcome == RENDER_OUTCOME_OK)
 		worker_pool_wait(work->request->service->workers, &work->encode);
 	else
-		request_resume(work->request);
+		hand_back(work);
 }
 
 /* --- the way through ------------------------------------------------------------------------------------------------------------ */

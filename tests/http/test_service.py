@@ -1,5 +1,6 @@
 """Routes, errors, headers and conditional requests."""
 import concurrent.futures
+import gzip
 import json
 import re
 import socket
@@ -251,6 +252,8 @@ def test_media_types(daemon):
         assert_problem(daemon.render(SMALL, Content_Type=kind), 415, "unsupported-media-type")
     assert daemon.render(SMALL, Content_Type="application/json; charset=utf-8").status == 200
     assert daemon.request("POST", "/v1/render", json.dumps(SMALL)).status == 200
+    assert_problem(daemon.render(gzip.compress(b"{}"), Content_Encoding="gzip"), 415, "unsupported-media-type")
+    assert daemon.render(SMALL, Content_Encoding="identity").status == 200
 
 
 def test_accept(daemon):
@@ -281,9 +284,29 @@ def test_deadline(daemon):
     assert daemon.metric('stratus_renders_ended_total{reason="expired"}') >= 1
 
 
+def test_a_late_image_is_not_sent(daemon):
+    """A deadline that ends while the image is encoded counts as well."""
+    scene = {"output": {"width": 2048, "height": 2048, "png_compression": "small"}}
+    timing = daemon.render(scene).timing
+    allowed = int(float(timing["total"]["dur"]) - 0.7 * float(timing["encode"]["dur"]))
+    for azimuth in (1, 2, 3):
+        answer = daemon.render({**scene, "camera": {"azimuth_deg": azimuth}}, X_Timeout_Ms=str(allowed))
+        assert answer.status in (200, 504)
+        assert answer.status == 504 or float(answer.timing["total"]["dur"]) < allowed + 50
+
+
 @pytest.mark.parametrize("query", ["a=%zz", "sun.elevation_deg=%00", "a=%ff", "&".join("a=1" for _ in range(200))])
 def test_bad_query(daemon, query):
     assert_problem(daemon.get("/v1/render?" + query), 400, "bad-request")
+
+
+def test_a_scene_comes_in_one_place(daemon):
+    """What stands in the other is refused rather than left unheard."""
+    posted = daemon.request("POST", "/v1/render?sun.elevation_deg=5", json.dumps(SMALL), {"Content-Type": "application/json"})
+    assert_problem(posted, 400, "bad-request")
+    target = "/v1/render?output.width=32&output.height=24"
+    assert_problem(daemon.request("GET", target, json.dumps(SMALL)), 400, "bad-request")
+    assert daemon.request("POST", "/v1/render?", json.dumps(SMALL), {"Content-Type": "application/json"}).status == 200
 
 
 def test_query_errors_have_pointers(daemon):
@@ -330,7 +353,7 @@ def test_chunked_body_is_refused_while_being_read(daemon):
                 client.settimeout(60)
                 answer = client.recv(4096)
         assert answer.startswith(b"HTTP/1.1 413 "), answer
-        assert b"body-too-large" in answer and b"X-Request-Id: endless" in answer
+        assert b"body-too-large" in answer and b"X-Request-Id: endless" in answer and b"Server-Timing: total;dur=" in answer
         assert sent < 16 << 20
     assert daemon.get("/healthz").status == 200
 

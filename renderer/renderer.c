@@ -217,6 +217,8 @@ static bool run_radiosity(struct job *job)
 	for (int band = 0; band < 3; band++)
 		block->air_below[band] = 1;
 	job->clouds = job->maps.coarse != NULL;
+	if (!job->clouds)
+		job->renderer->context.reused = false; /* it does not run at all */
 	return !job->clouds || radiosity_stage_run(&job->renderer->radiosity, &job->renderer->context, job->scene, &job->ground, &job->sky,
 						   &job->maps, job->slab, &job->light);
 }
@@ -355,7 +357,9 @@ static enum render_result run_stages(struct job *job)
 		timing->milliseconds = clock_milliseconds() - begin;
 		timing->reused = renderer->context.reused;
 		if (!ok)
-			return job->cancelled && job->cancelled(job->cancel_context) ? RENDER_CANCELLED : RENDER_OUT_OF_MEMORY;
+			return job->cancelled && job->cancelled(job->cancel_context) ? RENDER_CANCELLED
+			       : gl_lost()                                           ? RENDER_FAILED
+										     : RENDER_OUT_OF_MEMORY;
 		if (gl_failed(stage_names[i]))
 			return gl_failed_for_memory() ? RENDER_OUT_OF_MEMORY : RENDER_FAILED;
 	}

@@ -2,11 +2,15 @@
 #ifndef STRATUS_SERVER_DIGEST_H
 #define STRATUS_SERVER_DIGEST_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* 128 bits in hexadecimal and a NUL: enough that two texts never share one. */
 enum { DIGEST_SIZE = 33 };
 
 void digest_of(const void *bytes, size_t size, char digest[static DIGEST_SIZE]);
+
+/* Of a file's content. false when it cannot be read; the digest is then empty. */
+bool digest_of_file(const char *path, char digest[static DIGEST_SIZE]);
 
 #endif

@@ -12,6 +12,7 @@ enum render_outcome {
 	RENDER_OUTCOME_OK,      /* job->frame is set and belongs to the job's owner */
 	RENDER_OUTCOME_EXPIRED, /* the deadline passed, in the queue or between passes */
 	RENDER_OUTCOME_ABANDONED /* nobody waits for it any more */,
+	RENDER_OUTCOME_NO_MEMORY, /* this scene is too large for the device as it is loaded; others may do */
 	RENDER_OUTCOME_FAILED
 };
 

@@ -42,6 +42,9 @@ static enum render_outcome render(struct render_thread *thread, struct render_jo
 	enum render_result result = renderer_render(thread->renderer, job->scene, is_cancelled, job, &job->frame);
 	if (result == RENDER_CANCELLED)
 		return is_expired(job) ? RENDER_OUTCOME_EXPIRED : RENDER_OUTCOME_ABANDONED;
+	/* A scene that does not fit says nothing about the next one: only a failing device turns the daemon's health. */
+	if (result == RENDER_OUT_OF_MEMORY)
+		return RENDER_OUTCOME_NO_MEMORY;
 	thread->failures = result == RENDER_OK ? 0 : thread->failures + 1;
 	if (thread->failures >= FAILURES_MAX)
 		thread->state = RENDER_THREAD_FAILED;

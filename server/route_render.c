@@ -179,6 +179,9 @@ static enum MHD_Result finish(struct request *request)
 		return response_send_new_problem(request, PROBLEM_DEADLINE, "The image was not ready within its deadline.");
 	case RENDER_OUTCOME_ABANDONED:
 		return MHD_NO;
+	case RENDER_OUTCOME_NO_MEMORY:
+		return response_send_new_problem(request, PROBLEM_NO_MEMORY,
+						 "The device has no memory for an image of this size and these layers now.");
 	case RENDER_OUTCOME_FAILED:
 		return response_send_new_problem(request, PROBLEM_RENDER_FAILED,
 						 "The image could not be made. The log has the reason under %s.", request->id);
@@ -207,6 +210,7 @@ static void hand_back(struct render_work *work)
 {
 	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
 						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
+						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
 						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
 	if (work->job.outcome != RENDER_OUTCOME_OK)
 		metrics_count_end(work->request->service->metrics, ends[work->job.outcome]);

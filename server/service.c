@@ -3,6 +3,7 @@
 #include "renderer/log.h"
 #include "renderer/optics/kernel.h"
 #include "server/clock.h"
+#include "server/digest.h"
 #include "server/http.h"
 #include "server/response.h"
 #include "server/text.h"
@@ -22,14 +23,16 @@ static size_t worker_count(const struct config *config)
 	return processors < 1 ? 1 : processors > 16 ? 16 : (size_t)processors;
 }
 
-/* What an entity tag must know besides the scene. Shaders read from disk may change between two starts of one version, so a start then
- * counts as a version of its own. */
+/* What an entity tag must know besides the scene: two builds may round differently, so the program itself is part of it, shaders embedded.
+ * Shaders read from disk may change between two starts of one version, so a start then counts as a version of its own. */
 static char *pixel_version(const struct service *service)
 {
 	struct text text = {0};
+	char program[DIGEST_SIZE] = "";
+	digest_of_file("/proc/self/exe", program);
 	const struct renderer_info *info = render_thread_info(service->render_thread);
-	text_printf(&text, "%s|%s|%s|%s|%d|%llx", RENDERER_VERSION, info->vendor, info->renderer, info->version, (int)info->pass_kind,
-		    kernel_hash(render_thread_kernel(service->render_thread)));
+	text_printf(&text, "%s|%s|%s|%s|%s|%s|%d|%llx", RENDERER_VERSION, program, service->images->version, info->vendor, info->renderer,
+		    info->version, (int)info->pass_kind, kernel_hash(render_thread_kernel(service->render_thread)));
 	if (service->config->shader_dir)
 		text_printf(&text, "|%d|%f", (int)getpid(), clock_now_ms());
 	return text_take(&text);

@@ -197,7 +197,7 @@ const struct gl_context_info *gl_context_info(const struct gl_context *context)
 	return &context->info;
 }
 
-static _Thread_local bool memory_error;
+static _Thread_local bool memory_error, lost;
 
 bool gl_failed(const char *what)
 {
@@ -205,6 +205,7 @@ bool gl_failed(const char *what)
 	memory_error = false;
 	if (glGetGraphicsResetStatus() != GL_NO_ERROR) {
 		log_error("gl: context lost (%s)", what);
+		lost = true;
 		failed = true;
 	}
 	/* A lost context may report errors for ever: a bounded number of them is read. */
@@ -217,6 +218,11 @@ bool gl_failed(const char *what)
 		failed = true;
 	}
 	return failed;
+}
+
+bool gl_lost(void)
+{
+	return lost;
 }
 
 bool gl_failed_for_memory(void)

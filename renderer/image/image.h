@@ -23,6 +23,7 @@ struct image_buffer {
 };
 
 struct image_api {
+	const char *version; /* of this module and the libraries that decide about an image's bytes */
 	/* Encodes a frame as the scene's output asks (format, compression, type, bits). Any thread, several at once. false and a message in
 	 * `error` (at most error_size) on failure; buffer->data is then NULL. */
 	bool (*encode)(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata,

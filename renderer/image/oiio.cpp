@@ -351,7 +351,7 @@ bool encode(const struct frame *frame, const struct scene *scene, const struct i
 	return false;
 }
 
-const struct image_api api = {encode};
+const struct image_api api = {"OpenImageIO " OIIO_VERSION_STRING ", zlib " ZLIB_VERSION, encode};
 
 } // namespace
 

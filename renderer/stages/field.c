@@ -269,6 +269,7 @@ bool field_stage_run(const struct field_stage *stage, struct stage_context *cont
 	*maps = (struct field_maps){0};
 	fill_block(&context->block, &scene->clouds);
 	if (context->block.cloud_layer[3] < 0.5f) {
+		context->reused = false; /* nothing to remember */
 		stage_upload_block(context);
 		return true;
 	}

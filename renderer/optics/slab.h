@@ -1,0 +1,130 @@
+/* Light reflected and transmitted by a homogeneous plane-parallel layer of droplets over black ground, solved for all orders of scattering.
+ *
+ * The phase function is truncated by delta-M (W. J. Wiscombe 1977, J. Atmos. Sci. 34, 1408): P = f P_F + (1-f) P_D with f = chi_32, depth
+ * tau' = (1-f) tau. Orders 2 and more of (P_D, tau') come from adding-doubling with 32 streams, one azimuthal mode at a time
+ * (renderer/optics/slab_layer.h). The first order is exact in the angle, after T. Nakajima and M. Tanaka 1988, JQSRT 40, 51, extended so
+ * that it holds the aureole as well:
+ *   reflected    F0/(4 pi) mu_l/(mu_l+mu_v) (1 - exp(-s))  [P/(1-f) + C_r(Theta, s)],   s = tau'/mu_l + tau'/mu_v
+ *   transmitted  F0/(4 pi) mu_l/(mu_l-mu_v) (exp(-tau'/mu_l) - exp(-tau'/mu_v)) [P/(1-f) + C_t(Theta, s)],   s: mean slant depth tau'
+ * C_r and C_t put what delta-M took out back exactly once (renderer/optics/slab_residual.h); both vanish in thin layers.
+ *
+ * Units and conventions. tau: vertical optical thickness of the full phase function, >= 0; above SLAB_DEPTH_MAX by the asymptotic theory of
+ * thick conservative layers. mu_l, mu_v: cosines 0..1 of sun and view with the vertical. azimuth: between the headings of the light before
+ * and after, radians: 0 goes on forward (sun in front of the viewer), pi comes back (sun behind): pi minus azimuth(V) - azimuth(L) of the
+ * HTTP interface. Radiance is for F0 = 1 through a plane normal to the beam and never holds the unscattered beam. Everything is finite
+ * everywhere; arguments outside their range are clamped to it.
+ */
+#ifndef STRATUS_RENDERER_OPTICS_SLAB_H
+#define STRATUS_RENDERER_OPTICS_SLAB_H
+
+#include "renderer/optics/optics.h"
+
+enum {
+	SLAB_NODE_COUNT = 24, /* Gauss nodes in mu that tables interpolate between; those of the solver are 16 per hemisphere */
+	SLAB_PAIR_COUNT = SLAB_NODE_COUNT * (SLAB_NODE_COUNT + 1) / 2,
+	SLAB_MODE_COUNT = 32,  /* all that 32 streams carry: with 24, light that grazes thin layers rings in azimuth by 10 % */
+	SLAB_DEPTH_COUNT = 64, /* four per octave */
+	SLAB_RESIDUAL_DEPTH_COUNT = 32,
+	SLAB_RESIDUAL_ANGLE_COUNT = 256
+};
+
+#define SLAB_DEPTH_MIN 0.01 /* of the table; below it the shapes no longer change */
+#define SLAB_DEPTH_MAX 551.0
+
+enum slab_side { SLAB_REFLECTED, SLAB_TRANSMITTED, SLAB_SIDE_COUNT };
+
+struct slab_band {
+	double truncated; /* f, 0..1 */
+
+	/* Orders >= 2 of mode m, per pair of nodes i >= j at i (i+1)/2 + j: I = mu_l F0/pi (1 - exp(-tau'/mu_l)) (1 - exp(-tau'/mu_v)) K,
+	 * K = sum_m K_m cos(m azimuth) (sin_l sin_v for odd m). */
+	float order2[SLAB_SIDE_COUNT][SLAB_DEPTH_COUNT][SLAB_MODE_COUNT][SLAB_PAIR_COUNT];
+
+	/* Plane albedo, and transmittance less exp(-tau'/mu), over 1 - exp(-tau'/mu), at the nodes. */
+	double flux[SLAB_SIDE_COUNT][SLAB_DEPTH_COUNT][SLAB_NODE_COUNT];
+	/* Spherical albedo and transmittance (with the unscattered light). */
+	double spherical[SLAB_SIDE_COUNT][SLAB_DEPTH_COUNT];
+
+	double extrapolation; /* q: transmittance of thick layers is proportional to 1/(tau + q) */
+	double asymmetry;     /* largest relative difference of matrix elements that reciprocity makes equal, before they were averaged */
+
+	/* C_r and C_t at angles slab_residual_angle and depths slab_residual_depth. */
+	float residual[SLAB_SIDE_COUNT][SLAB_RESIDUAL_DEPTH_COUNT][SLAB_RESIDUAL_ANGLE_COUNT];
+};
+
+/* Plain data without pointers, 15 MB, so that it can be kept in a file. Read-only once made; may be shared between threads. */
+struct slab_solution {
+	double mu[SLAB_NODE_COUNT], weight[SLAB_NODE_COUNT];
+	struct slab_band band[BAND_COUNT];
+};
+
+/* Solves the three bands on `threads` threads (1..16, the caller's included), some 0.1 s on two. NULL (and a log line) when out of memory
+ * or when a band does not come out finite. Any thread; ended by slab_destroy. */
+struct slab_solution *slab_solve(const struct optics *optics, int threads);
+void slab_destroy(struct slab_solution *solution);
+
+/* --- radiance; any thread ------------------------------------------------------------------------------------------------------ */
+
+/* All orders but the unscattered beam, >= 0. optics: those that were solved. */
+double slab_radiance(const struct slab_solution *solution, const struct optics *optics, int band, enum slab_side side, double tau,
+		     double mu_l, double mu_v, double azimuth);
+
+/* Its two parts: the first order with aureole (of the forward direction itself: with the peak), and orders >= 2 of P_D. */
+double slab_radiance_single(const struct slab_solution *solution, const struct optics *optics, int band, enum slab_side side, double tau,
+			    double mu_l, double mu_v, double azimuth);
+double slab_radiance_multiple(const struct slab_solution *solution, int band, enum slab_side side, double tau, double mu_l, double mu_v,
+			      double azimuth);
+
+/* --- fluxes; any thread -------------------------------------------------------------------------------------------------------- */
+
+/* Fractions of the incident flux. Reflected and transmitted fractions are sums of their own; nothing is normalised. */
+struct slab_flux {
+	double reflected;   /* plane albedo */
+	double transmitted; /* plane transmittance, direct beam included */
+	double direct;      /* exp(-tau/mu_l) */
+};
+struct slab_flux slab_flux_at(const struct slab_solution *solution, int band, double tau, double mu_l);
+
+/* Under uniform diffuse light; direct is the unscattered part, 2 E_3(tau). */
+struct slab_flux slab_flux_spherical(const struct slab_solution *solution, int band, double tau);
+
+/* Fractions of the incident flux by number of scatterings 0, 1, 2, 3 and more; r[0] is 0. */
+struct slab_orders {
+	double r[4], t[4];
+};
+
+enum slab_phase { SLAB_PHASE_FULL, SLAB_PHASE_MODIFIED };
+
+/* By successive orders, for one layer: 1 ms. tau is that of the full phase function, > 0, also where the modified one is asked for, whose
+ * own is (1 - P_f) tau. mu_l at least 1e-3 (clamped). */
+struct slab_orders slab_orders_at(const struct optics *optics, int band, enum slab_phase phase, double tau, double mu_l);
+
+/* --- a renderer's table -------------------------------------------------------------------------------------------------------- */
+
+enum { SLAB_SLICE_VIEW_COUNT = 32, SLAB_SLICE_AZIMUTH_COUNT = 32 };
+
+/* K of orders >= 2 for one mu_l, both sides, bands as the last index: view i at slab_slice_zenith(i), azimuth j at
+ * j/(SLAB_SLICE_AZIMUTH_COUNT-1) pi, depth k at slab_depth(k). Made for linear interpolation in these indices. 1.5 MB. */
+struct slab_slice {
+	double mu_l;
+	float k[SLAB_SIDE_COUNT][SLAB_DEPTH_COUNT][SLAB_SLICE_VIEW_COUNT][SLAB_SLICE_AZIMUTH_COUNT][BAND_COUNT];
+};
+
+/* Fills a table; milliseconds; any thread. */
+void slab_slice_fill(const struct slab_solution *solution, double mu_l, struct slab_slice *slice);
+
+/* Radiance of orders >= 2 from the table as a shader would look it up. */
+double slab_slice_radiance(const struct slab_solution *solution, const struct slab_slice *slice, int band, enum slab_side side, double tau,
+			   double mu_v, double azimuth);
+
+/* Zenith angle of a view index, 0..pi/2, denser towards the horizon: pi/2 sin(pi/2 i/(SLAB_SLICE_VIEW_COUNT-1)), and its inverse. */
+double slab_slice_zenith(double view);
+double slab_slice_view(double mu_v);
+
+/* --- coordinates --------------------------------------------------------------------------------------------------------------- */
+
+/* 0..SLAB_DEPTH_COUNT-1 over SLAB_DEPTH_MIN..SLAB_DEPTH_MAX, logarithmic, and its inverse. */
+double slab_depth_coordinate(double tau);
+double slab_depth(double coordinate);
+
+#endif

@@ -1,0 +1,16 @@
+/* What evaluation of a solution and its tables share. Private to renderer/optics. */
+#ifndef STRATUS_RENDERER_OPTICS_SLAB_EVALUATE_H
+#define STRATUS_RENDERER_OPTICS_SLAB_EVALUATE_H
+
+#include "renderer/optics/slab.h"
+
+/* Coefficients of the polynomial through the solution's nodes, at mu in 0..1. */
+void slab_node_factors(const struct slab_solution *solution, double mu, double factor[SLAB_NODE_COUNT]);
+
+/* Transmittance of a layer thicker than the table's last over that of the last: asymptotic theory, 1/(tau + q); else 1. */
+double slab_thick_share(const struct slab_band *band, double tau);
+
+/* Radiance of orders >= 2 over K: mu_l/pi (1 - exp(-tau'/mu_l)) (1 - exp(-tau'/mu_v)). Arguments in range. */
+double slab_multiple_scale(const struct slab_band *band, double tau, double mu_l, double mu_v);
+
+#endif

@@ -1,0 +1,38 @@
+/* What delta-M takes out of the phase function, put back. Private to renderer/optics.
+ *
+ * With phi_l = f for l < 32 and chi_l beyond, the peak taken out is f P_F = sum (2l+1) phi_l P_l. Each scattering by P_F turns the light
+ * a little, and all of them along a slant depth s (of tau') multiply the Legendre coefficients by exp(-s (f - phi_l)/(1-f)).
+ *
+ * Transmitted: light that P_F alone scattered has coefficients exp(-s) (exp(-x + y_l) - exp(-x)), x = s f/(1-f), y_l = s phi_l/(1-f).
+ * Over the exp(-s) s of single scattering that is P_F's place in the first order:
+ *   C_t = sum (2l+1) [exp(-x) (exp(y_l) - 1)/s - phi_l/(1-f)] P_l(cos Theta).
+ * For thin layers it is 0, so that P/(1-f) is left: Nakajima-Tanaka's TMS. Aureole and TMS are one term and not two.
+ *
+ * Reflected: the light is turned on its way in and out, which blurs glory and fogbow: with B_l the coefficients
+ * of P of the back half alone (faded in between 100 and 135 degrees; only terms l >= 32, the others are in P_D)
+ *   C_r = sum (2l+1) B_l/(1-f) [(1 - exp(-s a_l))/(a_l (1 - exp(-s))) - 1] P_l(cos Theta),   a_l = 1 + (f - phi_l)/(1-f),
+ * the mean over depths of single scattering, s = tau'/mu_l + tau'/mu_v.
+ */
+#ifndef STRATUS_RENDERER_OPTICS_SLAB_RESIDUAL_H
+#define STRATUS_RENDERER_OPTICS_SLAB_RESIDUAL_H
+
+#include "renderer/optics/slab.h"
+
+/* Angle i, 0..pi, dense at both ends, and its inverse. */
+double slab_residual_angle(double i);
+double slab_residual_angle_index(double angle);
+
+/* Depth k: s = 4 w/(1 - w) with w = k/(SLAB_RESIDUAL_DEPTH_COUNT - 1), the last one infinite, and the inverse. */
+double slab_residual_depth(double k);
+double slab_residual_depth_index(double s);
+
+/* Fills band->residual[side] for band->truncated. Any thread. */
+void slab_residual_fill(const struct optics *optics, int band, enum slab_side side, struct slab_band *result);
+
+/* Mean of exp(-(a u + b (1 - u))) over u = 0..1 for a, b >= 0 (infinity: 0): attenuation of light scattered once on its way through. */
+double slab_mean_attenuation(double a, double b);
+
+/* Mean of a u + b (1 - u) itself over the same, weighted with the exponential. */
+double slab_mean_depth(double a, double b);
+
+#endif

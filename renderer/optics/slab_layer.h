@@ -5,7 +5,7 @@
  * With M = diag(mu) the transfer equation reads, t downward,
  *   dD/dt = -(M^-1 - S+) D + S- U,   -dU/dt = -(M^-1 - S+) U + S- D,   S+-_ij = 1/2 sqrt(w_i w_j / (mu_i mu_j)) p_m(mu_i, +-mu_j),
  * with p_m(mu, nu) = sum_l (2l+1) chi_l Y_l^m(mu) Y_l^m(nu), Y_l^m = sqrt((l-m)!/(l+m)!) P_l^m, and P = sum_m (2 - [m = 0]) p_m cos(m phi).
- * (J. E. Hansen and L. D. Travis 1974, Space Sci. Rev. 16, 527; W. J. Wiscombe 1976, JQSRT 16, 477 and 637.)
+ * (J. E. Hansen and L. D. Travis 1974, Space Sci. Rev. 16, 527; W. J. Wiscombe 1976, JQSRT 16, 637.)
  */
 #ifndef STRATUS_RENDERER_OPTICS_SLAB_LAYER_H
 #define STRATUS_RENDERER_OPTICS_SLAB_LAYER_H

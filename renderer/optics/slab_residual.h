@@ -1,4 +1,4 @@
-/* What delta-M takes out of the phase function, put back. Private to renderer/optics.
+/* What delta-M takes out of the phase function, put back: the tables C_r and C_t of renderer/optics/slab.h.
  *
  * With phi_l = f for l < 32 and chi_l beyond, the peak taken out is f P_F = sum (2l+1) phi_l P_l. Each scattering by P_F turns the light
  * a little, and all of them along a slant depth s (of tau') multiply the Legendre coefficients by exp(-s (f - phi_l)/(1-f)).

@@ -172,13 +172,21 @@ static void bind_inputs(struct pass_run *run, enum view_side side, const struct 
 		run->samplers[n++] = clouds[i];
 }
 
+/* Sine of the (negative) elevation of the horizon of a sphere `height` above the ground, seen from the camera; 1 from inside it. */
+static double horizon_sine(const struct scene_block *block, double height)
+{
+	const double radius = 6371000.0, h = block->camera_position[2];
+	return h < height ? 1 : -sqrt((h - height) * (2 * radius + h + height)) / (radius + h);
+}
+
 /* What the rays of a row of pixels have in common. The sine of the elevation along a row rises and falls at most once, so its ends, its
  * middle and the point nearest to the vertical plane bound it; a margin of two pixels covers the rest. */
-static enum view_region region_of_row(const struct scene_block *block, int row)
+static enum view_region region_of_row(const struct scene_block *block, enum view_side side, int row)
 {
 	enum { PROBES = 16 };
-	const double h = block->camera_position[2], radius = 6371000.0;
-	const double horizon = -sqrt(h * (2 * radius + h)) / (radius + h), margin = 2 * block->camera_position[3] + 1e-6;
+	const double margin = 2 * block->camera_position[3] + 1e-6, ground = horizon_sine(block, 0);
+	/* From above, rays that miss the ground may still graze the layer. */
+	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
 	const double y = 1 - 2 * (row + 0.5) * block->image_size[3];
 	double lowest = 1, highest = -1;
 	for (int i = 0; i <= PROBES; i++) {
@@ -194,15 +202,9 @@ static enum view_region region_of_row(const struct scene_block *block, int row)
 	}
 	/* Between probes a wide row can bulge beyond them by the square of their distance. */
 	const double bulge = pow(block->camera_right[3] / PROBES, 2);
-	if (lowest - bulge > horizon + margin)
+	if (lowest - bulge > sky + margin)
 		return VIEW_SKY;
-	return highest + bulge < horizon - margin ? VIEW_GROUND : VIEW_MIXED;
-}
-
-/* From above, rays that miss the ground but graze the layer belong to neither region. */
-static enum view_region region_for(enum view_side side, enum view_region region)
-{
-	return side == VIEW_ABOVE && region == VIEW_SKY ? VIEW_MIXED : region;
+	return highest + bulge < ground - margin ? VIEW_GROUND : VIEW_MIXED;
 }
 
 /* Runs over rows of one kind after the other, each with the program made for it. */
@@ -211,13 +213,13 @@ static void run_regions(const struct view_stage *stage, const struct stage_conte
 	const int height = run->targets[0]->height;
 	run->width = run->targets[0]->width;
 	for (int first = 0; first < height;) {
-		const enum view_region region = region_of_row(&context->block, first);
+		const enum view_region region = region_of_row(&context->block, side, first);
 		int end = first + 1;
-		while (end < height && region_of_row(&context->block, end) == region)
+		while (end < height && region_of_row(&context->block, side, end) == region)
 			end++;
 		run->first_row = first;
 		run->height = end - first;
-		pass_run(stage->passes[side][region_for(side, region)], run);
+		pass_run(stage->passes[side][region], run);
 		first = end;
 	}
 }

@@ -234,7 +234,7 @@ void view_add_sky(vec3 direction, vec2 air, INOUT(view_parts) parts)
 #endif
 
 // The whole picture. Decided when the shader is built, since software renderers execute both sides of every branch:
-// VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_REGION: rays of this part of the picture end on the ground (1), do not (2), or do either (0).
+// VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
 view_parts view_ray(vec3 direction)
 {
 	vec2 air = sky_table_coordinates(direction);
@@ -246,7 +246,7 @@ view_parts view_ray(vec3 direction)
 #else
 	bool to_ground = direction.z <= sphere_horizon(camera_position.z);
 #endif
-#if VIEW_ABOVE
+#if VIEW_ABOVE && VIEW_REGION != 2
 	// Rays that end on the ground, or pass between the horizons of layer and ground, meet the layer first.
 	float t = view_cloud_distance(direction);
 	if (t >= 0.0)

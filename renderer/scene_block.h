@@ -28,7 +28,7 @@ struct scene_block {
 	float cloud_detail[4];          /* tile of the detail, m; its drift, m: east, north; weight */
 	float cloud_threshold[4];       /* field value where H begins; 1/(range above it); exponent of H; resolution of the field */
 	float extinction[4];            /* kappa, 1/m; the same over the extinction of appendix B (thickness by similarity), 550 nm */
-	float extinction_modified[4];   /* kappa_S, 1/m; P_f at 550 nm */
+	float extinction_modified[4];   /* kappa_S, 1/m; - */
 	float sky_irradiance_cloud[4];  /* clear sky on a horizontal plane at the top of the layer, W/m2/nm */
 	float sky_irradiance_ground[4]; /* the same at the ground, without clouds */
 	float air_below[4];             /* how much darker the clouds make the light of the air beneath them, 0..1 */

@@ -163,7 +163,6 @@ const struct slab_tables *slab_tables_get(struct stage_context *context, const s
 {
 	const struct optics *optics = droplets->optics;
 	context->block.extinction[3] = (float)(optics->extinction_per_m[1] / PAPER_EXTINCTION_PER_M);
-	context->block.extinction_modified[3] = (float)optics->forward_peak_fraction[1];
 
 	struct cache_key key = cache_key_make("slab");
 	const double inputs[] = {scene->dsd.n0_per_cm3, scene->dsd.gamma,         scene->dsd.effective_radius_um, scene->model.optics,

@@ -83,17 +83,17 @@ void view_layer_sunlight(vec3 direction, bool through, float thickness, float de
 	float m_v = max(mu_v_facet, 0.03);
 	vec3 tau = vec3(extinction_modified) * (thickness * depth_scale);
 	vec3 shape = (through ? slab_single_transmitted(tau, m_l, m_v) : facing * slab_single_reflected(tau, m_l, m_v)) * (0.25 / PI);
-	float p_f = extinction_modified.w;
+	vec3 p_f = vec3(1.0) - vec3(extinction_modified) / vec3(extinction);
 	vec3 full = phase_full(angle);
 	parts.order2 = sun * phase_twice(angle) * shape * slab_double_scale(thickness, through);
 	parts.multiple = sun * (mu_l / PI) * slab_multiple(thickness, through);
 #if VIEW_ABOVE
 	// The forward peak does not turn back.
-	parts.order1 = sun * full / (1.0 - p_f) * shape;
+	parts.order1 = sun * full / (vec3(1.0) - p_f) * shape;
 #else
 	float depth = through ? extinction.y * thickness * 0.5 * (1.0 / m_l + 1.0 / m_v) : 0.0;
 	// One event and no forward ones beside it: order 0 inside the forward peak, order 1 outside.
-	vec3 sharp = full * (exp2(-1.442695 * p_f * depth) / (1.0 - p_f)) * shape;
+	vec3 sharp = full * exp(-p_f * depth) / (vec3(1.0) - p_f) * shape;
 	bool inside = angle.x < FORWARD_PEAK_SINE;
 	parts.order0 = sun * ((inside ? sharp : vec3(0.0)) + forward_peak(angle, depth));
 	parts.order1 = sun * ((inside ? vec3(0.0) : sharp) + forward_blur(angle, depth) * shape);

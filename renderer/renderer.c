@@ -215,7 +215,7 @@ static bool run_radiosity(struct job *job)
 {
 	struct scene_block *block = &job->renderer->context.block;
 	for (int band = 0; band < 3; band++)
-		block->air_below[band] = 1;
+		block->air_below[band] = 1, block->air_around[band] = 0;
 	job->clouds = job->maps.coarse != NULL;
 	if (!job->clouds)
 		job->renderer->context.reused = false; /* it does not run at all */

@@ -31,7 +31,8 @@ struct scene_block {
 	float extinction_modified[4];   /* kappa_S, 1/m; - */
 	float sky_irradiance_cloud[4];  /* clear sky on a horizontal plane at the top of the layer, W/m2/nm */
 	float sky_irradiance_ground[4]; /* the same at the ground, without clouds */
-	float air_below[4];             /* how much darker the clouds make the light of the air beneath them, 0..1 */
+	float air_below[4];             /* share of a clear sky's light that the clouds leave to the air beneath them, 0..1 */
+	float air_around[4];            /* radiance that this air scatters beside, of light which comes from cloud base and ground */
 	float band_red[4];              /* linear Rec.709 of unit radiance at 650 nm, 1 = 1000 cd/m2 (stages/colour.h) */
 	float band_green[4];            /* 550 nm */
 	float band_blue[4];             /* 450 nm */

@@ -222,14 +222,24 @@ static struct result *result_compute(const struct radiosity_stage *stage, const 
 	return result;
 }
 
-/* Air under the clouds is lit by what comes through them: as much darker as the ground is. */
+/* Air under the clouds keeps the share of a clear sky's light that the beam does on its way to the ground; a beam along the horizon is
+ * taken for its share of all light. In place of the rest it is among cloud base and ground, whose light it scatters without preference:
+ * mean radiance over the sphere, of the flux from above and from below. */
 static void fill_air_below(struct scene_block *block, const struct result *result, const struct sky_tables *sky)
 {
-	const double mu = fmax(0, block->sun_direction[2]);
+	const double mu = fmax(0, block->sun_direction[2]), grazing = fmax(0, 1 - mu / 0.1);
 	for (int band = 0; band < 3; band++) {
-		const double clear = sky->sun_ground[band] * mu + sky->diffuse_ground[band];
-		const double clouded = result->ground_direct[band] + result->ground_diffuse[band];
-		block->air_below[band] = (float)(clear > 0 ? fmin(1.5, clouded / clear) : 1);
+		const double beam = sky->sun_ground[band] * mu, diffuse = sky->diffuse_ground[band];
+		const double clear = beam + grazing * diffuse;
+		const double clouded = result->ground_direct[band] + grazing * result->ground_diffuse[band];
+		const double share = clear > 0 ? fmin(1, clouded / clear) : 1;
+		const double albedo = block->ground_mean_albedo[band];
+		const double around_clear = diffuse + albedo * (beam + diffuse);
+		const double around = result->ground_diffuse[band] + albedo * (result->ground_direct[band] + result->ground_diffuse[band]);
+		const double extinction = block->rayleigh[band] + block->aerosol[band];
+		const double scattered = (block->rayleigh[band] + block->aerosol[band] * block->aerosol_shape[0]) / fmax(extinction, 1e-30);
+		block->air_below[band] = (float)share;
+		block->air_around[band] = (float)(fmax(0, around - share * around_clear) * scattered / (2 * M_PI));
 	}
 }
 

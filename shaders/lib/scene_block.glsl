@@ -28,6 +28,7 @@ layout(std140, binding = 0) uniform scene_block {
 	vec4 sky_irradiance_cloud;
 	vec4 sky_irradiance_ground;
 	vec4 air_below;
+	vec4 air_around;
 	vec4 band_red;
 	vec4 band_green;
 	vec4 band_blue;

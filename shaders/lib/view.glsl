@@ -154,7 +154,7 @@ view_parts view_from_below(vec3 direction, vec2 air)
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
 	parts.sun_direct = view_sun_disc(direction) * exp(-vec3(extinction) * (thickness / mu_v));
 	parts.sky = max(vec3(textureLod(sky_total, air, 0.0)) - near, vec3(0.0)) * parts.transmittance;
-	parts.air = near * vec3(air_below);
+	parts.air = near * vec3(air_below) + (vec3(1.0) - to_layer) * vec3(air_around);
 	parts.optical_thickness = extinction.y * thickness;
 	parts.distance = thickness > 0.01 ? t : 0.0;
 	return parts;
@@ -208,13 +208,15 @@ void view_add_ground(vec3 direction, vec2 air, INOUT(view_parts) parts)
 	float mu_v = max(-sphere_cosine(camera_position.z, direction.z, t, 0.0), 0.002);
 	float footprint = camera_position.w * t * inversesqrt(mu_v);
 	float mu_sun = view_sun_cosine(direction, t, 0.0);
-	parts.ground = view_ground(place, footprint, mu_sun) * vec3(textureLod(air_to_end, air, 0.0)) * parts.transmittance;
+	vec3 to_end = vec3(textureLod(air_to_end, air, 0.0));
+	parts.ground = view_ground(place, footprint, mu_sun) * to_end * parts.transmittance;
 	vec3 total = vec3(textureLod(sky_total, air, 0.0));
 #if VIEW_ABOVE
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
-	parts.air = near + max(total - near, vec3(0.0)) * vec3(air_below) * parts.transmittance;
+	vec3 below = max(vec3(textureLod(air_to_layer, air, 0.0)) - to_end, vec3(0.0));
+	parts.air = near + (max(total - near, vec3(0.0)) * vec3(air_below) + below * vec3(air_around)) * parts.transmittance;
 #else
-	parts.air = total * vec3(air_below); // which is 1 without clouds
+	parts.air = total * vec3(air_below) + (vec3(1.0) - to_end) * vec3(air_around); // 1 and 0 without clouds
 #endif
 	if (parts.distance == 0.0)
 		parts.distance = t;

@@ -157,6 +157,7 @@ static vec4 arguments[4], stored[8];
 	X(sky_irradiance_cloud)                                                                                                            \
 	X(sky_irradiance_ground)                                                                                                           \
 	X(air_below)                                                                                                                       \
+	X(air_around)                                                                                                                      \
 	X(band_red)                                                                                                                        \
 	X(band_green)                                                                                                                      \
 	X(band_blue)                                                                                                                       \

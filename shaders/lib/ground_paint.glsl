@@ -61,7 +61,7 @@ vec3 ground_country(vec2 p, float tile)
 vec3 ground_sea_ice(vec2 p, float tile)
 {
 	int floes = max(1, int(tile / 3400.0 + 0.5));
-	vec2 warp = 0.3 * vec2(noise_turbulence(p, floes, 5, 51u, 0.0), noise_turbulence(p, floes, 5, 52u, 0.0));
+	vec2 warp = 0.13 * vec2(noise_turbulence(p, floes, 3, 51u, 0.0), noise_turbulence(p, floes, 3, 52u, 0.0));
 	vec2 floe = ground_patches(p * float(floes) + warp, floes, 53u);
 	float basin = noise_turbulence(p, max(1, int(tile / 9000.0 + 0.5)), 4, 54u, 0.0);
 	// Leads are wide where the basin opens and close to cracks elsewhere.

@@ -90,3 +90,18 @@ double scene_ground_largest_reflectance(const struct scene_ground *ground)
 		largest = fmax(ground->albedo[0], fmax(ground->albedo[1], ground->albedo[2]));
 	return largest * ground->albedo_scale;
 }
+
+void scene_camera_axes(const struct scene_camera *camera, double axes[3][3])
+{
+	const double degree = M_PI / 180, e = camera->elevation_deg * degree, roll = camera->roll_deg * degree;
+	/* Facing south and tilted up to the zenith, or north and down to the nadir, leaves north at the top. */
+	const double azimuth = camera->elevation_deg >= 90 ? M_PI : camera->elevation_deg <= -90 ? 0 : camera->azimuth_deg * degree;
+	const double right[3] = {cos(azimuth), -sin(azimuth), 0};
+	const double up[3] = {-sin(e) * sin(azimuth), -sin(e) * cos(azimuth), cos(e)};
+	const double forward[3] = {cos(e) * sin(azimuth), cos(e) * cos(azimuth), sin(e)};
+	for (int i = 0; i < 3; i++) {
+		axes[0][i] = cos(roll) * right[i] + sin(roll) * up[i];
+		axes[1][i] = cos(roll) * up[i] - sin(roll) * right[i];
+		axes[2][i] = forward[i];
+	}
+}

@@ -149,6 +149,10 @@ struct scene scene_default(void);
 /* Liquid water content of a droplet size distribution in g/m3: 4/3 pi rho N0 <r^3>, rho = 1e6 g/m3. Any thread. */
 double scene_dsd_liquid_water(const struct scene_dsd *dsd);
 
+/* Axes of a camera: unit vectors to the right, up and forward in axes[0..2], each east, north, up. At the poles (elevation 90 and -90) up
+ * is northwards, whatever the azimuth; a positive roll turns the picture clockwise, so the camera itself anticlockwise. Any thread. */
+void scene_camera_axes(const struct scene_camera *camera, double axes[3][3]);
+
 /* Largest reflectance that a ground shows in any band, albedo_scale included; a scene's is at most 1. Any thread. */
 double scene_ground_largest_reflectance(const struct scene_ground *ground);
 

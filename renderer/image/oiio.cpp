@@ -198,18 +198,8 @@ std::vector<channel> choose_channels(const struct frame &frame, enum exr_type ty
  * it: row vectors, point * matrix. */
 void camera_matrix(const struct scene_camera &camera, float matrix[16])
 {
-	const double degree = M_PI / 180;
-	const double az = camera.azimuth_deg * degree, el = camera.elevation_deg * degree, roll = camera.roll_deg * degree;
-	/* east, north, up; the camera turns against the clock where the picture is to turn with it */
-	const double view[3] = {std::sin(az) * std::cos(el), std::cos(az) * std::cos(el), std::sin(el)};
-	const double level_right[3] = {std::cos(az), -std::sin(az), 0};
-	const double level_up[3] = {-std::sin(az) * std::sin(el), -std::cos(az) * std::sin(el), std::cos(el)};
 	double axes[3][3];
-	for (int i = 0; i < 3; i++) {
-		axes[0][i] = std::cos(roll) * level_right[i] + std::sin(roll) * level_up[i];
-		axes[1][i] = std::cos(roll) * level_up[i] - std::sin(roll) * level_right[i];
-		axes[2][i] = view[i];
-	}
+	scene_camera_axes(&camera, axes);
 	for (int axis = 0; axis < 3; axis++) {
 		const double *a = axes[axis];
 		const double *p = camera.position_m;

@@ -66,28 +66,20 @@ static void set4(float *to, double x, double y, double z, double w)
 	to[3] = (float)w;
 }
 
-/* Camera axes: forward by azimuth and elevation, up towards the zenith (at the poles: what azimuth points to), then rolled. A positive roll
- * turns the picture clockwise, so the camera itself anticlockwise. */
 static void fill_camera(struct scene_block *block, const struct scene *scene)
 {
 	const struct scene_camera *camera = &scene->camera;
-	const double a = camera->azimuth_deg * M_PI / 180, e = camera->elevation_deg * M_PI / 180, roll = camera->roll_deg * M_PI / 180;
-	const double right[3] = {cos(a), -sin(a), 0};
-	const double up[3] = {-sin(e) * sin(a), -sin(e) * cos(a), cos(e)};
-	double rolled_right[3], rolled_up[3];
-	for (int i = 0; i < 3; i++) {
-		rolled_right[i] = cos(roll) * right[i] + sin(roll) * up[i];
-		rolled_up[i] = cos(roll) * up[i] - sin(roll) * right[i];
-	}
+	double axes[3][3];
+	scene_camera_axes(camera, axes);
 	const double tan_v = tan(0.5 * camera->vertical_fov_deg * M_PI / 180);
 	const double tan_h = tan_v * scene->output.width / scene->output.height;
 	const double tile = scene->clouds.tile_m;
 	const double x = camera->position_m[0], y = camera->position_m[1];
 	set4(block->camera_position, x - tile * floor(x / tile), y - tile * floor(y / tile), camera->position_m[2],
 	     2 * tan_v / scene->output.height);
-	set4(block->camera_right, rolled_right[0], rolled_right[1], rolled_right[2], tan_h);
-	set4(block->camera_up, rolled_up[0], rolled_up[1], rolled_up[2], tan_v);
-	set4(block->camera_forward, cos(e) * sin(a), cos(e) * cos(a), sin(e), camera->projection);
+	set4(block->camera_right, axes[0][0], axes[0][1], axes[0][2], tan_h);
+	set4(block->camera_up, axes[1][0], axes[1][1], axes[1][2], tan_v);
+	set4(block->camera_forward, axes[2][0], axes[2][1], axes[2][2], camera->projection);
 	set4(block->image_size, scene->output.width, scene->output.height, 1.0 / scene->output.width, 1.0 / scene->output.height);
 }
 

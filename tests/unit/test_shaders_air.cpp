@@ -284,19 +284,17 @@ static void roll_turns_the_picture_clockwise(void **)
 	assert_near(upper.z, 0, 1e-6);
 }
 
-/* At the poles, the top of the picture is what lies ahead when looking up at the nadir, and behind at the zenith: no jump on the way. */
+/* At the poles the top of the picture is north, whatever the azimuth. */
 static void up_at_the_poles(void **)
 {
-	for (double pole : {-90., 90.}) {
-		set_camera(70, pole, 0, 60);
-		const vec3 at_pole = camera_ray(vec2(60, 0));
-		set_camera(70, pole * 0.99999, 0, 60);
-		assert_near(glm::length(at_pole - camera_ray(vec2(60, 0))), 0, 1e-3);
+	for (double azimuth : {0., 70., 140., 360.}) {
+		for (double pole : {-90., 90.}) {
+			set_camera(azimuth, pole, 0, 60);
+			const vec3 top = camera_ray(vec2(100, 0));
+			assert_true(top.y > 0.4f);
+			assert_near(top.x, 0, 1e-6);
+		}
 	}
-	set_camera(0, -90, 0, 60);
-	assert_true(camera_ray(vec2(100, 0)).y > 0.4f);
-	set_camera(0, 90, 0, 60);
-	assert_true(camera_ray(vec2(100, 0)).y < -0.4f);
 }
 
 int main()

@@ -52,7 +52,7 @@ programs: $(PROGRAMS) $(B)/stratus-image.so
 # The Mie kernel table does not depend on sanitizers: always made by the plain program, anew when what it says has changed.
 kernel: build/mie.kernel
 MIE_SRC := $(wildcard renderer/optics/mie*.c renderer/optics/kernel*.c) renderer/optics/quadrature.c
-KERNEL_SRC := renderer/programs/kernel.c $(MIE_SRC) renderer/log.c
+KERNEL_SRC := renderer/programs/kernel.c $(MIE_SRC) renderer/file_replace.c renderer/log.c
 ifeq ($(SAN),)
 build/mie.kernel: $(MIE_SRC) renderer/optics/kernel_table.h | build/stratus-kernel
 	build/stratus-kernel -o $@

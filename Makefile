@@ -22,11 +22,11 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 
 # Debian packages: to build and run, and to test. scripts/packages.sh installs those that are missing.
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
-	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcurl4-openssl-dev ca-certificates curl
+	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml clang-format procps
 
 pkg = $(shell pkg-config $(1) $(2))
-RENDERER_LIBS = $(call pkg,--libs,epoxy libxxhash) -lEGL -lm
+RENDERER_LIBS = $(call pkg,--libs,epoxy libxxhash cminpack) -lEGL -lm
 SERVER_LIBS = $(call pkg,--libs,libmicrohttpd jansson nettle) -lnova -ldl
 CLIENT_LIBS = $(call pkg,--libs,libcurl jansson)
 
@@ -88,16 +88,18 @@ $(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -fPIC $(call pkg,--cflags,OpenImageIO) -c $< -o $@
 
+$(B)/renderer/optics/paper_fit_solve.c.o: CFLAGS += $(call pkg,--cflags,cminpack)
+
 # The optics are the one place where the compiler's best vector code is worth asking for.
 OPTICS_OPT := -O3 -g -ffp-contract=fast
 $(B)/renderer/optics/%.c.o: OPT := $(OPTICS_OPT)
 
-# Files of what the optics computed say by which sources, compiler and flags.
+# Files of what the optics computed say by which sources, compiler, flags and solver.
 OPTICS_TEXT := $(wildcard renderer/optics/*.[ch]) Makefile
 $(B)/gen/optics_digest.h: OPT := $(OPTICS_OPT)
 $(B)/gen/optics_digest.h: $(OPTICS_TEXT)
 	@mkdir -p $(@D)
-	@{ $(CC) --version; echo '$(CFLAGS)'; cat $(filter-out Makefile,$^); } | sha256sum | sed 's/^\(.\{32\}\).*/#define OPTICS_DIGEST "\1"/' >$@
+	@{ $(CC) --version; echo '$(CFLAGS)' $(call pkg,--modversion,cminpack); cat $(filter-out Makefile,$^); } | sha256sum | sed 's/^\(.\{32\}\).*/#define OPTICS_DIGEST "\1"/' >$@
 $(B)/renderer/optics/droplet_file.c.o: CPPFLAGS += -I$(B)/gen
 $(B)/renderer/optics/droplet_file.c.o: $(B)/gen/optics_digest.h
 

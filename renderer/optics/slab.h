@@ -5,7 +5,8 @@
  * (renderer/optics/slab_layer.h). The first order is exact in the angle, after T. Nakajima and M. Tanaka 1988, JQSRT 40, 51, extended so
  * that it holds the aureole as well:
  *   reflected    F0/(4 pi) mu_l/(mu_l+mu_v) (1 - exp(-s))  [P/(1-f) + C_r(Theta, s)],   s = tau'/mu_l + tau'/mu_v
- *   transmitted  F0/(4 pi) mu_l/(mu_l-mu_v) (exp(-tau'/mu_l) - exp(-tau'/mu_v)) [P/(1-f) + C_t(Theta, s)],   s: mean slant depth tau'
+ *   transmitted  F0/(4 pi) mu_l/(mu_l-mu_v) (exp(-tau'/mu_l) - exp(-tau'/mu_v)) [exp(-x) P/(1-f) + C_t(Theta, s)],
+ *                x = s f/(1-f), s: mean slant depth tau'
  * C_r and C_t put what delta-M took out back exactly once (renderer/optics/slab_residual.h); both vanish in thin layers.
  *
  * Units and conventions. tau: vertical optical thickness of the full phase function, >= 0; above SLAB_DEPTH_MAX by the asymptotic theory of
@@ -114,7 +115,7 @@ struct slab_orders slab_orders_at(const struct optics *optics, int band, enum sl
 enum { SLAB_SLICE_DEPTH_COUNT = SLAB_DEPTH_COUNT + 1, SLAB_SLICE_VIEW_COUNT = 32, SLAB_SLICE_AZIMUTH_COUNT = 32 };
 
 /* K of orders >= 2 for one mu_l and one side, bands as the last index: view i at slab_slice_zenith(i), azimuth j at
- * j/(SLAB_SLICE_AZIMUTH_COUNT-1) pi, depth k at slab_slice_depth = k. Made for linear interpolation in these indices, all bands at once.
+ * slab_slice_azimuth(j), depth k at slab_slice_depth = k. Made for linear interpolation in these indices, all bands at once.
  * 0.8 MB. */
 struct slab_slice {
 	double mu_l;
@@ -134,6 +135,10 @@ double slab_slice_radiance(const struct slab_solution *solution, const struct sl
 /* Zenith angle of a view index, 0..pi/2, denser towards the horizon: pi/2 sin(pi/2 i/(SLAB_SLICE_VIEW_COUNT-1)), and its inverse. */
 double slab_slice_zenith(double view);
 double slab_slice_view(double mu_v);
+
+/* Azimuth of an index, 0..pi, denser in front: pi (t + t^2)/2, t = j/(SLAB_SLICE_AZIMUTH_COUNT-1), and the index of a cosine of it. */
+double slab_slice_azimuth(double index);
+double slab_slice_azimuth_index(double cosine);
 
 /* Index of a depth at 550 nm: slab_depth_coordinate as far as that goes; from there to the last, which is infinitely deep, linear in the
  * transmittance. */

@@ -139,6 +139,17 @@ double slab_residual_at(const struct slab_band *band, enum slab_side side, doubl
 	return sum;
 }
 
+void slab_residual_column(const struct slab_band *band, enum slab_side side, double angle, float column[SLAB_RESIDUAL_DEPTH_COUNT])
+{
+	struct stencil stencil = stencil_at(slab_residual_angle_index(angle), SLAB_RESIDUAL_ANGLE_COUNT);
+	for (int depth = 0; depth < SLAB_RESIDUAL_DEPTH_COUNT; depth++) {
+		double sum = 0;
+		for (int k = 0; k < STENCIL; k++)
+			sum += stencil.factor[k] * band->residual[side][depth][stencil.first + k];
+		column[depth] = (float)sum;
+	}
+}
+
 double slab_radiance_single(const struct slab_solution *solution, const struct optics *optics, int band, enum slab_side side, double tau,
 			    double mu_l, double mu_v, double azimuth)
 {
@@ -164,7 +175,8 @@ double slab_radiance_single(const struct slab_solution *solution, const struct o
 	}
 	if (!(geometry > 0))
 		return 0;
-	double phase = optics_phase(optics, band, angle) / (1 - table->truncated) + slab_residual_at(table, side, angle, s);
+	double sharp = side == SLAB_TRANSMITTED ? exp(-s * table->truncated / (1 - table->truncated)) : 1;
+	double phase = sharp * optics_phase(optics, band, angle) / (1 - table->truncated) + slab_residual_at(table, side, angle, s);
 	return fmax(phase, 0) * geometry / (4 * M_PI);
 }
 

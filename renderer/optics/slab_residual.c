@@ -77,15 +77,17 @@ static int series_length(const double *moment, int count)
 	return l < count ? l : count / SLICE * SLICE;
 }
 
-/* Coefficients without their 2l+1, phi = phi_l/(1-f), f = f/(1-f). */
-static double transmitted_factor(double s, double phi, double f)
+/* Coefficients without their 2l+1, phi = phi_l/(1-f), f = f/(1-f), full = chi_l/(1-f). */
+static double transmitted_factor(double s, double phi, double f, double full)
 {
 	double x = s * f, y = s * phi;
 	if (s == 0)
 		return 0;
 	if (isinf(s))
-		return -phi;
-	return (exp(y - x) - exp(-x)) / s - phi;
+		return full - phi;
+	/* (exp(y) - 1)/s - phi without cancellation where y is small. */
+	double rest = y < 1e-4 ? phi * y * (0.5 + y / 6) : expm1(y) / s - phi;
+	return exp(-x) * rest - expm1(-x) * (full - phi);
 }
 
 /* back: chi_l of the back half over 1-f. */
@@ -173,7 +175,7 @@ void slab_residual_fill(const struct optics *optics, int band, enum slab_side si
 				int l = first + k;
 				double phi = l < LAYER_MOMENTS ? f : moment[l] / (1 - result->truncated);
 				double value = side == SLAB_REFLECTED ? reflected_factor(s, phi, f, back[l] / (1 - result->truncated))
-								      : transmitted_factor(s, phi, f);
+								      : transmitted_factor(s, phi, f, moment[l] / (1 - result->truncated));
 				factor[k] = (2 * l + 1) * value;
 			}
 			add_slice(&legendre, factor, 0, sum[0][depth]);

@@ -4,9 +4,11 @@
  * a little, and all of them along a slant depth s (of tau') multiply the Legendre coefficients by exp(-s (f - phi_l)/(1-f)).
  *
  * Transmitted: light that P_F alone scattered has coefficients exp(-s) (exp(-x + y_l) - exp(-x)), x = s f/(1-f), y_l = s phi_l/(1-f).
- * Over the exp(-s) s of single scattering that is P_F's place in the first order:
- *   C_t = sum (2l+1) [exp(-x) (exp(y_l) - 1)/s - phi_l/(1-f)] P_l(cos Theta).
- * For thin layers it is 0, so that P/(1-f) is left: Nakajima-Tanaka's TMS. Aureole and TMS are one term and not two.
+ * Over the exp(-s) s of single scattering that is P_F's place in the first order, beside P_D:
+ *   P_D + sum (2l+1) exp(-x) (exp(y_l) - 1)/s P_l = exp(-x) P/(1-f) + C_t,
+ *   C_t = sum (2l+1) [exp(-x) ((exp(y_l) - 1)/s - phi_l/(1-f)) + (1 - exp(-x)) (chi_l - phi_l)/(1-f)] P_l(cos Theta).
+ * Split like this C_t is smooth: what is sharp in P was turned by one peak event alone. For thin layers it is 0, so that P/(1-f) is left:
+ * Nakajima-Tanaka's TMS. Aureole and TMS are one term and not two.
  *
  * Reflected: the light is turned on its way in and out, which blurs glory and fogbow: with B_l the coefficients
  * of P of the back half alone (faded in between 100 and 135 degrees; only terms l >= 32, the others are in P_D)
@@ -31,6 +33,9 @@ void slab_residual_fill(const struct optics *optics, int band, enum slab_side si
 
 /* The table's value at an angle and depth, by cubics through its neighbours. Any thread. */
 double slab_residual_at(const struct slab_band *band, enum slab_side side, double angle, double s);
+
+/* The table's values at an angle at all its depths. Any thread. */
+void slab_residual_column(const struct slab_band *band, enum slab_side side, double angle, float column[SLAB_RESIDUAL_DEPTH_COUNT]);
 
 /* Mean of exp(-(a u + b (1 - u))) over u = 0..1 for a, b >= 0 (infinity: 0): attenuation of light scattered once on its way through. */
 double slab_mean_attenuation(double a, double b);

@@ -27,6 +27,17 @@ double slab_slice_view(double mu_v)
 	return (VIEWS - 1) * (2 / M_PI) * asin(fmin(acos(mu_v) * (2 / M_PI), 1));
 }
 
+double slab_slice_azimuth(double index)
+{
+	double t = index / (AZIMUTHS - 1);
+	return M_PI / 2 * (t + t * t);
+}
+
+double slab_slice_azimuth_index(double cosine)
+{
+	return (AZIMUTHS - 1) * (sqrt(0.25 + acos(cosine) * (2 / M_PI)) - 0.5);
+}
+
 static void fill_directions(const struct slab_solution *solution, double mu_l, struct directions *directions)
 {
 	double factor[N];
@@ -43,7 +54,7 @@ static void fill_directions(const struct slab_solution *solution, double mu_l, s
 	}
 	for (int mode = 0; mode < MODES; mode++)
 		for (int i = 0; i < AZIMUTHS; i++)
-			directions->cosine[mode][i] = (float)cos(mode * M_PI * i / (AZIMUTHS - 1));
+			directions->cosine[mode][i] = (float)cos(mode * slab_slice_azimuth(i));
 }
 
 /* The sun's direction contracted; false when the mode does not matter beside the first. */
@@ -154,7 +165,7 @@ double slab_slice_radiance(const struct slab_solution *solution, const struct sl
 	azimuth = isfinite(azimuth) ? azimuth : 0;
 	int depth = split(slab_slice_depth(solution, tau), SLAB_SLICE_DEPTH_COUNT, &share[0]);
 	int view = split(slab_slice_view(mu_v), VIEWS, &share[1]);
-	int column = split(acos(cos(azimuth)) / M_PI * (AZIMUTHS - 1), AZIMUTHS, &share[2]);
+	int column = split(slab_slice_azimuth_index(cos(azimuth)), AZIMUTHS, &share[2]);
 	for (int corner = 0; corner < 8; corner++) {
 		int a = corner & 1, b = corner >> 1 & 1, c = corner >> 2;
 		double weight = (a ? share[0] : 1 - share[0]) * (b ? share[1] : 1 - share[1]) * (c ? share[2] : 1 - share[2]);

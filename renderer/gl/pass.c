@@ -160,9 +160,12 @@ void pass_destroy(struct pass *pass)
 
 static void run_compute(const struct pass *pass, const struct pass_run *run, int width, int height)
 {
-	for (int i = 0; i < pass->outputs; i++)
-		glBindImageTexture((GLuint)i, run->targets[i]->id, run->level, GL_FALSE, 0, GL_WRITE_ONLY,
-				   texture_internal_format(run->targets[i]->format));
+	for (int i = 0; i < pass->outputs; i++) {
+		/* Stores to an image unit without a texture are discarded. */
+		const struct texture *target = run->targets[i];
+		glBindImageTexture((GLuint)i, target ? target->id : 0, target ? run->level : 0, GL_FALSE, 0, GL_WRITE_ONLY,
+				   texture_internal_format(target ? target->format : TEXTURE_RGBA32F));
+	}
 	glProgramUniform4i(pass->program, pass->size, width, height, run->first_row, 0);
 	glDispatchCompute((GLuint)(width + GROUP_SIDE - 1) / GROUP_SIDE, (GLuint)(height + GROUP_SIDE - 1) / GROUP_SIDE, 1);
 	glMemoryBarrier(GL_ALL_BARRIER_BITS);
@@ -170,11 +173,15 @@ static void run_compute(const struct pass *pass, const struct pass_run *run, int
 
 static void run_fragment(const struct pass *pass, const struct pass_run *run, int width, int height)
 {
-	static const GLenum buffers[PASS_OUTPUTS_MAX] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
-							 GL_COLOR_ATTACHMENT3, GL_COLOR_ATTACHMENT4, GL_COLOR_ATTACHMENT5,
-							 GL_COLOR_ATTACHMENT6, GL_COLOR_ATTACHMENT7};
-	for (int i = 0; i < pass->outputs; i++)
-		glNamedFramebufferTexture(pass->framebuffer, buffers[i], run->targets[i]->id, run->level);
+	static const GLenum attachments[PASS_OUTPUTS_MAX] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
+							     GL_COLOR_ATTACHMENT3, GL_COLOR_ATTACHMENT4, GL_COLOR_ATTACHMENT5,
+							     GL_COLOR_ATTACHMENT6, GL_COLOR_ATTACHMENT7};
+	GLenum buffers[PASS_OUTPUTS_MAX];
+	for (int i = 0; i < pass->outputs; i++) {
+		buffers[i] = run->targets[i] ? attachments[i] : GL_NONE;
+		glNamedFramebufferTexture(pass->framebuffer, attachments[i], run->targets[i] ? run->targets[i]->id : 0,
+					  run->targets[i] ? run->level : 0);
+	}
 	glNamedFramebufferDrawBuffers(pass->framebuffer, pass->outputs, buffers);
 	glBindFramebuffer(GL_DRAW_FRAMEBUFFER, pass->framebuffer);
 	glViewport(0, 0, width, run->first_row + height);
@@ -184,7 +191,7 @@ static void run_fragment(const struct pass *pass, const struct pass_run *run, in
 	glDrawArrays(GL_TRIANGLES, 0, 3);
 	/* Detached again, so that a texture deleted later is really freed, and none stays attached while it is sampled. */
 	for (int i = 0; i < pass->outputs; i++)
-		glNamedFramebufferTexture(pass->framebuffer, buffers[i], 0, 0);
+		glNamedFramebufferTexture(pass->framebuffer, attachments[i], 0, 0);
 }
 
 static int level_size(int size, int level)

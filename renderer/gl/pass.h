@@ -34,7 +34,7 @@ struct pass *pass_create(const struct pass_compiler *compiler, const struct pass
 void pass_destroy(struct pass *pass);
 
 struct pass_run {
-	struct texture *const *targets; /* as many as the pass has outputs, all of one size */
+	struct texture *const *targets; /* as many as the pass has outputs, all of one size; NULL after the first: not kept */
 	int level;                      /* of the targets, 0 the largest */
 	int width, height;              /* pixels to run; 0: the size of the targets at that level */
 	int first_row;                  /* where the rows begin */

@@ -41,9 +41,31 @@ bool texture_init(struct texture *texture, int width, int height, enum texture_f
 	return true;
 }
 
+bool texture_init_3d(struct texture *texture, int width, int height, int depth, enum texture_format format)
+{
+	static const GLenum wraps[] = {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R};
+	*texture = (struct texture){.width = width, .height = height, .depth = depth, .levels = 1, .format = format};
+	glCreateTextures(GL_TEXTURE_3D, 1, &texture->id);
+	glTextureStorage3D(texture->id, 1, formats[format].internal, width, height, depth);
+	glTextureParameteri(texture->id, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+	glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+	for (int i = 0; i < 3; i++)
+		glTextureParameteri(texture->id, wraps[i], GL_CLAMP_TO_EDGE);
+	if (gl_failed("texture storage")) {
+		texture_finish(texture);
+		return false;
+	}
+	return true;
+}
+
 void texture_upload(const struct texture *texture, const float *values)
 {
-	glTextureSubImage2D(texture->id, 0, 0, 0, texture->width, texture->height, formats[texture->format].external, GL_FLOAT, values);
+	if (texture->depth > 0)
+		glTextureSubImage3D(texture->id, 0, 0, 0, 0, texture->width, texture->height, texture->depth,
+				    formats[texture->format].external, GL_FLOAT, values);
+	else
+		glTextureSubImage2D(texture->id, 0, 0, 0, texture->width, texture->height, formats[texture->format].external, GL_FLOAT,
+				    values);
 }
 
 void texture_build_mipmaps(const struct texture *texture)
@@ -68,7 +90,8 @@ size_t texture_bytes(const struct texture *texture)
 	size_t bytes = 0;
 	for (int level = 0; level < texture->levels; level++) {
 		const int width = texture->width >> level, height = texture->height >> level;
-		bytes += formats[texture->format].texel_bytes * (size_t)(width ? width : 1) * (size_t)(height ? height : 1);
+		bytes += formats[texture->format].texel_bytes * (size_t)(width ? width : 1) * (size_t)(height ? height : 1) *
+			 (size_t)(texture->depth ? texture->depth : 1);
 	}
 	return texture->id ? bytes : 0;
 }

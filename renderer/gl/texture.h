@@ -1,4 +1,4 @@
-/* Two-dimensional textures of known size and format. The thread that owns the context calls. */
+/* Two- and three-dimensional textures of known size and format. The thread that owns the context calls. */
 #ifndef STRATUS_RENDERER_GL_TEXTURE_H
 #define STRATUS_RENDERER_GL_TEXTURE_H
 
@@ -10,6 +10,7 @@ enum texture_format { TEXTURE_R32F, TEXTURE_RG32F, TEXTURE_RGBA32F, TEXTURE_RGBA
 struct texture {
 	unsigned id; /* OpenGL name, 0 when there is none */
 	int width, height, levels;
+	int depth; /* 0: two-dimensional */
 	enum texture_format format;
 };
 
@@ -23,7 +24,10 @@ enum texture_flags {
 /* Allocates; contents undefined. false (and a log line) when OpenGL refuses. */
 bool texture_init(struct texture *texture, int width, int height, enum texture_format format, int flags);
 
-/* Replaces level 0: rows of width x components floats. Not for TEXTURE_RGBA8/16. */
+/* The same with a third dimension, of one level, filtered linearly along all three and clamped to the edges. */
+bool texture_init_3d(struct texture *texture, int width, int height, int depth, enum texture_format format);
+
+/* Replaces level 0: rows of width x components floats, in three dimensions plane after plane. Not for TEXTURE_RGBA8/16. */
 void texture_upload(const struct texture *texture, const float *values);
 
 /* Fills the other levels with box-filtered ones. */

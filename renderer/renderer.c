@@ -3,7 +3,6 @@
 #include "renderer/gl/context.h"
 #include "renderer/gl/timer.h"
 #include "renderer/log.h"
-#include "renderer/optics/paper_slab.h"
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/view.h"
@@ -165,7 +164,7 @@ struct job {
 
 	struct ground_maps ground;
 	const struct droplets *droplets;
-	const struct slab_tables *slab;
+	const struct texture *slab_rows, *slab_slices;
 	struct sky_tables sky;
 	struct field_maps maps;
 	struct radiosity_light light;
@@ -178,8 +177,8 @@ static bool run_optics(struct job *job)
 {
 	struct stage_context *context = &job->renderer->context;
 	job->droplets = droplets_get(context, job->scene);
-	job->slab = job->droplets ? slab_tables_get(context, job->scene, job->droplets) : NULL;
-	return job->slab != NULL;
+	job->slab_rows = job->droplets ? slab_rows_get(context, job->scene, job->droplets) : NULL;
+	return job->slab_rows && slab_slices_get(context, job->scene, job->droplets, &job->slab_slices);
 }
 
 /* What the air above gets back from below: the ground where it lies open, under clouds the deck and the ground behind it with all light
@@ -188,9 +187,10 @@ static void mean_albedo(const struct job *job, double albedo[3])
 {
 	const struct scene_clouds *clouds = &job->scene->clouds;
 	const double cover = clouds->type == CLOUD_NONE ? 0 : clouds->coverage;
-	const double t = paper_spherical_transmittance(0.6 * clouds->thickness_m * job->renderer->context.block.extinction[3]), r = 1 - t;
+	const struct droplet_tables *droplets = job->droplets->tables;
 	for (int band = 0; band < 3; band++) {
-		const double ground = job->ground.mean[band];
+		const double tau = 0.6 * clouds->thickness_m * droplets->optics->extinction_per_m[band];
+		const double r = slab_spherical_albedo(droplets->slab, band, tau), t = 1 - r, ground = job->ground.mean[band];
 		albedo[band] = (1 - cover) * ground + cover * (r + t * t * ground / (1 - r * ground));
 	}
 }
@@ -220,7 +220,7 @@ static bool run_radiosity(struct job *job)
 	if (!job->clouds)
 		job->renderer->context.reused = false; /* it does not run at all */
 	return !job->clouds || radiosity_stage_run(&job->renderer->radiosity, &job->renderer->context, job->scene, &job->ground, &job->sky,
-						   &job->maps, job->slab, &job->light);
+						   &job->maps, job->slab_rows, &job->light);
 }
 
 /* Horizontal illuminance at the camera: above the clouds by the clear sky, below them means over the tile. */
@@ -272,7 +272,8 @@ static bool run_view(struct job *job)
 	struct frame *frame = job->frame;
 	const struct view_inputs inputs = {.ground = &job->ground,
 					   .droplets = job->droplets,
-					   .slab = job->slab,
+					   .slab_rows = job->slab_rows,
+					   .slab_slices = job->slab_slices,
 					   .sky = &job->sky,
 					   .field = &job->maps,
 					   .light = job->clouds ? &job->light : NULL};

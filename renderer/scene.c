@@ -56,9 +56,8 @@ struct scene scene_default(void)
 	scene.radiosity.enabled = true;
 	scene.radiosity.tolerance = 0.001;
 	scene.radiosity.max_passes = 64;
-	/* The exact slab ("solved") becomes the default with its solver; until then the paper's own shading is. */
 	scene.model.name = MODEL_SLAB;
-	scene.model.shading = SHADING_PAPER;
+	scene.model.shading = SHADING_SOLVED;
 	scene.model.optics = OPTICS_MIE;
 	scene.output.width = 1024;
 	scene.output.height = 768;

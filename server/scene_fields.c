@@ -56,7 +56,7 @@ const struct scene_field scene_fields[] = {
 
 	{"model", "name", FIELD_CHOICE, AT(scene.model.name), .choices = scene_model_names,
 	 .choices_later = LATER(MODEL_REFERENCE) | LATER(MODEL_VOLUME) | LATER(MODEL_PLANAR)},
-	{"model", "shading", FIELD_CHOICE, AT(scene.model.shading), .choices = scene_shading_names, .choices_later = LATER(SHADING_SOLVED)},
+	{"model", "shading", FIELD_CHOICE, AT(scene.model.shading), .choices = scene_shading_names},
 	{"model", "optics", FIELD_CHOICE, AT(scene.model.optics), .choices = scene_optics_names},
 
 	{"output", "width", FIELD_INTEGER, AT(scene.output.width), BETWEEN(16, 8192)},

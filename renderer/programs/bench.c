@@ -52,6 +52,8 @@ static const struct setting settings[] = {
 	NUMBER("camera.roll_deg", camera.roll_deg),
 	NUMBER("camera.vertical_fov_deg", camera.vertical_fov_deg),
 	NUMBER("radiosity.tolerance", radiosity.tolerance),
+	WORD("model.shading", model.shading, scene_shading_names),
+	WORD("model.optics", model.optics, scene_optics_names),
 };
 
 static void usage(FILE *to)

@@ -1,94 +1,102 @@
 #include "renderer/stages/droplets.h"
 
 #include "renderer/log.h"
-#include "renderer/optics/forward.h"
+#include "renderer/optics/slab_residual.h"
 
 #include <math.h>
 #include <stdlib.h>
+
+enum { WIDTH = EVENT_TABLE_WIDTH, DEPTHS = EVENT_TABLE_DEPTHS, PARTS = 4 };
+
+_Static_assert((int)DEPTHS == (int)FORWARD_DEPTH_COUNT && (int)DEPTHS == (int)SLAB_RESIDUAL_DEPTH_COUNT, "one depth a row");
+_Static_assert((int)WIDTH >= (int)FORWARD_ANGLE_COUNT && (int)WIDTH >= (int)BLUR_ANGLE_COUNT, "a part fits into the width");
+
+/* RGBA of one depth of one part. */
+typedef float event_row[WIDTH][4];
 
 static void droplets_destroy(void *value)
 {
 	struct droplets *droplets = value;
 	if (!droplets)
 		return;
-	texture_finish(&droplets->forward_blur);
-	texture_finish(&droplets->forward_peak);
+	texture_finish(&droplets->events);
 	texture_finish(&droplets->phase);
-	optics_destroy(droplets->optics);
+	droplet_tables_destroy((struct droplet_tables *)droplets->tables);
 	free(droplets);
 }
 
-/* Angle of a column of the phase tables: uniform in sin(angle/2) in front, in cos(angle/2) behind (shaders/lib/optics.glsl). */
-static double column_angle(int column, int width)
-{
-	const double unit = (double)column / (width - 1);
-	return unit < 0.5 ? 2 * asin(unit * M_SQRT2) : 2 * acos(fmin(1, (1 - unit) * M_SQRT2));
-}
-
-/* Two rows, P and P_2, as logarithms: linear interpolation of those is far closer on the flanks of the forward peak. */
 static bool upload_phase(struct droplets *droplets)
 {
-	float(*rows)[PHASE_TABLE_WIDTH][4] = calloc(2, sizeof *rows);
+	float(*rows)[DROPLET_PHASE_COLUMNS][4] = calloc(2, sizeof *rows);
 	if (!rows)
 		return false;
-	for (int i = 0; i < PHASE_TABLE_WIDTH; i++) {
-		const double angle = column_angle(i, PHASE_TABLE_WIDTH);
-		for (int band = 0; band < BAND_COUNT; band++) {
-			rows[0][i][band] = (float)log2(fmax(1e-12, optics_phase(droplets->optics, band, angle)));
-			rows[1][i][band] = (float)log2(fmax(1e-12, optics_phase2(droplets->optics, band, angle)));
-		}
-	}
-	const bool ok = texture_init(&droplets->phase, PHASE_TABLE_WIDTH, 2, TEXTURE_RGBA32F, 0);
+	for (int row = 0; row < 2; row++)
+		for (int i = 0; i < DROPLET_PHASE_COLUMNS; i++)
+			for (int band = 0; band < BAND_COUNT; band++)
+				rows[row][i][band] = droplets->tables->phase[row][i][band];
+	const bool ok = texture_init(&droplets->phase, DROPLET_PHASE_COLUMNS, 2, TEXTURE_RGBA32F, 0);
 	if (ok)
 		texture_upload(&droplets->phase, &rows[0][0][0]);
 	free(rows);
 	return ok;
 }
 
-static bool upload_bands(struct texture *texture, int width, int height, const float *triples)
+static void fill_peak(const struct forward_tables *forward, event_row *rows)
 {
-	const size_t texels = (size_t)width * (size_t)height;
-	float *quads = calloc(texels, 4 * sizeof *quads);
-	if (!quads)
-		return false;
-	for (size_t i = 0; i < texels; i++)
-		for (size_t band = 0; band < BAND_COUNT; band++)
-			quads[4 * i + band] = triples[BAND_COUNT * i + band];
-	const bool ok = texture_init(texture, width, height, TEXTURE_RGBA32F, 0);
-	if (ok)
-		texture_upload(texture, quads);
-	free(quads);
-	return ok;
+	for (int depth = 0; depth < DEPTHS; depth++)
+		for (int i = 0; i < WIDTH; i++) {
+			const int k = i < FORWARD_ANGLE_COUNT ? i : FORWARD_ANGLE_COUNT - 1;
+			for (int band = 0; band < BAND_COUNT; band++)
+				rows[depth][i][band] = forward->peak[depth][k][band];
+		}
 }
 
-/* The blur, which is smooth, from its even steps in angle to the columns of the phase tables. */
-static void resample_blur(const struct forward_tables *tables, float (*rows)[BLUR_ANGLE_COUNT][BAND_COUNT])
+/* The blur, which is smooth, from its even steps in angle to columns like those of the phase tables. */
+static void fill_blur(const struct forward_tables *forward, event_row *rows)
 {
 	for (int i = 0; i < BLUR_ANGLE_COUNT; i++) {
-		const double at = column_angle(i, BLUR_ANGLE_COUNT) / M_PI * (BLUR_ANGLE_COUNT - 1);
+		const double at = droplet_phase_angle(i, BLUR_ANGLE_COUNT) / M_PI * (BLUR_ANGLE_COUNT - 1);
 		const int k = (int)fmin(at, BLUR_ANGLE_COUNT - 2);
 		const double share = at - k;
-		for (int depth = 0; depth < FORWARD_DEPTH_COUNT; depth++)
+		for (int depth = 0; depth < DEPTHS; depth++)
 			for (int band = 0; band < BAND_COUNT; band++)
 				rows[depth][i][band] =
-					(float)((1 - share) * tables->blur[depth][k][band] + share * tables->blur[depth][k + 1][band]);
+					(float)((1 - share) * forward->blur[depth][k][band] + share * forward->blur[depth][k + 1][band]);
 	}
 }
 
-static bool upload_forward(struct droplets *droplets)
+/* Columns dense at both ends: half the sine, respectively cosine, of half the angle as a square (solved_residual_column in
+ * shaders/lib/slab_solved.glsl). */
+static double residual_angle(int column)
 {
-	struct forward_tables *tables = malloc(sizeof *tables);
-	float(*blur)[BLUR_ANGLE_COUNT][BAND_COUNT] = malloc(sizeof tables->blur);
-	bool ok = false;
-	if (!tables || !blur)
-		goto end;
-	forward_tables_compute(droplets->optics, tables);
-	resample_blur(tables, blur);
-	ok = upload_bands(&droplets->forward_peak, FORWARD_ANGLE_COUNT, FORWARD_DEPTH_COUNT, &tables->peak[0][0][0]) &&
-	     upload_bands(&droplets->forward_blur, BLUR_ANGLE_COUNT, FORWARD_DEPTH_COUNT, &blur[0][0][0]);
-end:
-	free(blur);
-	free(tables);
+	const double unit = 2.0 * column / (WIDTH - 1);
+	return unit < 1 ? 2 * asin(unit * unit * M_SQRT1_2) : 2 * acos((2 - unit) * (2 - unit) * M_SQRT1_2);
+}
+
+static void fill_residual(const struct slab_solution *slab, enum slab_side side, event_row *rows)
+{
+	for (int band = 0; band < BAND_COUNT; band++)
+		for (int i = 0; i < WIDTH; i++) {
+			float column[SLAB_RESIDUAL_DEPTH_COUNT];
+			slab_residual_column(&slab->band[band], side, residual_angle(i), column);
+			for (int depth = 0; depth < DEPTHS; depth++)
+				rows[depth][i][band] = column[depth];
+		}
+}
+
+static bool upload_events(struct droplets *droplets)
+{
+	event_row *rows = calloc(PARTS * DEPTHS, sizeof *rows);
+	if (!rows)
+		return false;
+	fill_peak(droplets->tables->forward, rows);
+	fill_blur(droplets->tables->forward, rows + DEPTHS);
+	fill_residual(droplets->tables->slab, SLAB_REFLECTED, rows + 2 * DEPTHS);
+	fill_residual(droplets->tables->slab, SLAB_TRANSMITTED, rows + 3 * DEPTHS);
+	const bool ok = texture_init(&droplets->events, WIDTH, PARTS * DEPTHS, TEXTURE_RGBA32F, 0);
+	if (ok)
+		texture_upload(&droplets->events, &rows[0][0][0]);
+	free(rows);
 	return ok;
 }
 
@@ -97,8 +105,8 @@ static struct droplets *droplets_create(const struct stage_context *context, con
 	struct droplets *droplets = calloc(1, sizeof *droplets);
 	if (!droplets)
 		return NULL;
-	droplets->optics = optics_create(context->kernel, &scene->dsd, scene->model.optics);
-	if (!droplets->optics || !upload_phase(droplets) || !upload_forward(droplets)) {
+	droplets->tables = droplet_tables_create(context->kernel, &scene->dsd, scene->model.optics, 2);
+	if (!droplets->tables || !upload_phase(droplets) || !upload_events(droplets)) {
 		log_error("optics: out of memory");
 		droplets_destroy(droplets);
 		return NULL;
@@ -106,7 +114,7 @@ static struct droplets *droplets_create(const struct stage_context *context, con
 	return droplets;
 }
 
-static void add_droplets(struct cache_key *key, const struct scene *scene)
+void droplets_key_add(struct cache_key *key, const struct scene *scene)
 {
 	cache_key_add(key, scene->dsd.n0_per_cm3);
 	cache_key_add(key, scene->dsd.gamma);
@@ -114,27 +122,33 @@ static void add_droplets(struct cache_key *key, const struct scene *scene)
 	cache_key_add(key, scene->model.optics);
 }
 
+static void fill_block(struct scene_block *block, const struct scene *scene, const struct droplet_tables *tables)
+{
+	const struct optics *optics = tables->optics;
+	const bool solved = scene->model.shading == SHADING_SOLVED;
+	for (int band = 0; band < BAND_COUNT; band++) {
+		const double kappa = optics->extinction_per_m[band], modified = kappa * (1 - optics->forward_peak_fraction[band]);
+		block->extinction[band] = (float)kappa;
+		block->extinction_modified[band] = (float)modified;
+		block->extinction_scaled[band] = (float)(solved ? kappa * (1 - tables->slab->band[band].truncated) : modified);
+	}
+	block->extinction_scaled[3] = (float)tables->slab->band[1].extrapolation;
+}
+
 const struct droplets *droplets_get(struct stage_context *context, const struct scene *scene)
 {
 	struct cache_key key = cache_key_make("droplets");
-	add_droplets(&key, scene);
+	droplets_key_add(&key, scene);
 	struct droplets *droplets = cache_find(context->cache, &key);
 	if (!droplets) {
 		context->reused = false;
 		droplets = droplets_create(context, scene);
 		if (!droplets)
 			return NULL;
-		const size_t bytes = texture_bytes(&droplets->phase) + texture_bytes(&droplets->forward_peak) +
-				     texture_bytes(&droplets->forward_blur) +
-				     (size_t)(droplets->optics->angle_count * 8 + droplets->optics->moment_count * 9) * sizeof(double);
+		const size_t bytes = texture_bytes(&droplets->phase) + texture_bytes(&droplets->events) + droplets->tables->bytes;
 		if (!cache_keep(context->cache, &key, droplets, bytes, droplets_destroy))
 			return NULL;
 	}
-	const struct optics *optics = droplets->optics;
-	for (int band = 0; band < BAND_COUNT; band++) {
-		context->block.extinction[band] = (float)optics->extinction_per_m[band];
-		context->block.extinction_modified[band] =
-			(float)(optics->extinction_per_m[band] * (1 - optics->forward_peak_fraction[band]));
-	}
+	fill_block(&context->block, scene, droplets->tables);
 	return droplets;
 }

@@ -16,8 +16,8 @@ static const struct pass_desc pass_descs[FIELD_PASS_COUNT] = {
 	[PASS_MAXIMUM] = {.file = "shaders/passes/height_maximum.glsl", .outputs = 1, .samplers = {"height_below"}},
 };
 
-/* HEIGHT_SIDE as in shaders/lib/height.glsl, DETAIL_SIDE as in shaders/lib/field.glsl. */
-enum { DETAIL_SIDE = 512, HEIGHT_SIDE = 1024, HISTOGRAM_BINS = 4096 };
+/* HEIGHT_SIDE and HEIGHT_SIDE_BELOW as in shaders/lib/height.glsl, DETAIL_SIDE as in shaders/lib/field.glsl. */
+enum { DETAIL_SIDE = 512, HEIGHT_SIDE = 1024, HEIGHT_SIDE_BELOW = 256, HISTOGRAM_BINS = 4096 };
 
 /* Densities are sums of noise within -3..3 and cells within 0..1, with weights below 1: nothing lies outside. */
 static const double density_lowest = -5, density_highest = 6;
@@ -225,38 +225,50 @@ static void maximum_level(const struct field_stage *stage, struct height_field *
 		texture_finish(&below);
 }
 
-static struct height_field *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse)
+static bool maximum_compute(const struct field_stage *stage, struct height_field *field)
 {
+	if (!texture_init(&field->maximum, HEIGHT_SIDE / 2, HEIGHT_SIDE / 2, TEXTURE_R32F,
+			  TEXTURE_REPEAT | TEXTURE_NEAREST | TEXTURE_MIPMAPS))
+		return false;
+	for (int level = 0; level < field->maximum.levels; level++)
+		maximum_level(stage, field, level);
+	return true;
+}
+
+static struct height_field *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse, bool from_above)
+{
+	const int side = from_above ? HEIGHT_SIDE : HEIGHT_SIDE_BELOW;
 	struct height_field *field = calloc(1, sizeof *field);
 	if (!field)
 		return NULL;
-	if (!texture_init(&field->height, HEIGHT_SIDE, HEIGHT_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS) ||
-	    !texture_init(&field->maximum, HEIGHT_SIDE / 2, HEIGHT_SIDE / 2, TEXTURE_R32F,
-			  TEXTURE_REPEAT | TEXTURE_NEAREST | TEXTURE_MIPMAPS)) {
+	if (!texture_init(&field->height, side, side, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
 		height_field_destroy(field);
 		return NULL;
 	}
 	pass_run(stage->passes[PASS_HEIGHT], &(struct pass_run){.targets = (struct texture *[]){&field->height},
 								.samplers = {&coarse->coarse, &coarse->detail},
-								.arguments = {{(float)HEIGHT_SIDE}}});
+								.arguments = {{(float)side}}});
 	texture_build_mipmaps(&field->height);
-	for (int level = 0; level < field->maximum.levels; level++)
-		maximum_level(stage, field, level);
+	if (from_above && !maximum_compute(stage, field)) {
+		height_field_destroy(field);
+		return NULL;
+	}
 	return field;
 }
 
 static const struct height_field *height_field_get(const struct field_stage *stage, struct stage_context *context,
-						   const struct scene *scene, const struct coarse_field *coarse)
+						   const struct scene *scene, const struct coarse_field *coarse, bool from_above)
 {
 	struct cache_key key = cache_key_make("height");
 	add_field_inputs(&key, &scene->clouds);
 	cache_key_add(&key, scene->clouds.coverage);
 	cache_key_add(&key, scene->clouds.thickness_m);
+	cache_key_add(&key, from_above);
 	struct height_field *field = cache_find(context->cache, &key);
 	if (field)
 		return field;
 	context->reused = false;
-	field = height_field_compute(stage, coarse);
+	field = height_field_compute(stage, coarse, from_above);
 	if (!field ||
 	    !cache_keep(context->cache, &key, field, texture_bytes(&field->height) + texture_bytes(&field->maximum), height_field_destroy))
 		return NULL;
@@ -283,14 +295,12 @@ bool field_stage_run(const struct field_stage *stage, struct stage_context *cont
 	stage_upload_block(context);
 	maps->coarse = &coarse->coarse;
 	maps->detail = &coarse->detail;
-	if (!from_above)
-		return true;
-	const struct height_field *height = height_field_get(stage, context, scene, coarse);
+	const struct height_field *height = height_field_get(stage, context, scene, coarse, from_above);
 	if (!height) {
 		log_error("field: out of memory");
 		return false;
 	}
 	maps->height = &height->height;
-	maps->maximum = &height->maximum;
+	maps->maximum = from_above ? &height->maximum : NULL;
 	return true;
 }

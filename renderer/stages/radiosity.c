@@ -11,8 +11,7 @@ enum { PASS_SOURCES, PASS_START, PASS_EXCHANGE, PASS_CLOSE, PASS_REDUCE };
 static const struct pass_desc pass_descs[RADIOSITY_PASS_COUNT] = {
 	[PASS_SOURCES] = {.file = "shaders/passes/radiosity_sources.glsl",
 			  .outputs = 4,
-			  .samplers = {"transmittance_table", "field_coarse", "field_detail", "slab_sun_table", "ground_map",
-				       "ground_relief"}},
+			  .samplers = {"transmittance_table", "field_coarse", "field_detail", "slab_table", "ground_map", "ground_relief"}},
 	[PASS_START] = {.file = "shaders/passes/radiosity_start.glsl",
 			.outputs = 4,
 			.samplers = {"cloud_source", "ground_albedo_plane", "ground_direct"}},
@@ -108,11 +107,11 @@ static void fill_weights(float arguments[PASS_ARGUMENTS][4], const struct scene_
 }
 
 static void run_sources(const struct radiosity_stage *stage, struct planes *planes, const struct ground_maps *ground,
-			const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab)
+			const struct sky_tables *sky, const struct field_maps *field, const struct texture *slab_rows)
 {
 	struct texture *targets[] = {&planes->source, &planes->cloud_albedo, &planes->ground_albedo, &planes->ground_direct};
 	pass_run(stage->passes[PASS_SOURCES], &(struct pass_run){.targets = targets,
-								 .samplers = {sky->transmittance, field->coarse, field->detail, &slab->sun,
+								 .samplers = {sky->transmittance, field->coarse, field->detail, slab_rows,
 									      ground->map, ground->relief}});
 	/* The source is spread out by its levels; of the others only the means are asked for. */
 	radiosity_build_levels(stage->passes[PASS_REDUCE], &planes->source, &planes->cloud_albedo);
@@ -208,7 +207,7 @@ static void result_destroy(void *value)
 }
 
 static struct result *result_compute(const struct radiosity_stage *stage, const struct scene *scene, const struct ground_maps *ground,
-				     const struct sky_tables *sky, const struct field_maps *field, const struct slab_tables *slab)
+				     const struct sky_tables *sky, const struct field_maps *field, const struct texture *slab_rows)
 {
 	struct planes planes;
 	struct result *result = calloc(1, sizeof *result);
@@ -216,7 +215,7 @@ static struct result *result_compute(const struct radiosity_stage *stage, const 
 		free(result);
 		return NULL;
 	}
-	run_sources(stage, &planes, ground, sky, field, slab);
+	run_sources(stage, &planes, ground, sky, field, slab_rows);
 	compute(stage, &planes, scene, result);
 	planes_finish(&planes);
 	return result;
@@ -245,7 +244,7 @@ static void fill_air_below(struct scene_block *block, const struct result *resul
 
 bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_context *context, const struct scene *scene,
 			 const struct ground_maps *ground, const struct sky_tables *sky, const struct field_maps *field,
-			 const struct slab_tables *slab, struct radiosity_light *light)
+			 const struct texture *slab_rows, struct radiosity_light *light)
 {
 	struct cache_key key = cache_key_make("radiosity");
 	stage_key_add_light(&key, scene);
@@ -253,7 +252,7 @@ bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_conte
 	if (!result) {
 		context->reused = false;
 		stage_upload_block(context);
-		result = result_compute(stage, scene, ground, sky, field, slab);
+		result = result_compute(stage, scene, ground, sky, field, slab_rows);
 		if (!result || !cache_keep(context->cache, &key, result, 2 * texture_bytes(&result->ground_received), result_destroy)) {
 			log_error("radiosity: out of memory");
 			return false;

@@ -6,10 +6,10 @@
 #ifndef STRATUS_RENDERER_STAGES_RADIOSITY_H
 #define STRATUS_RENDERER_STAGES_RADIOSITY_H
 
-#include "renderer/stages/droplets.h"
 #include "renderer/stages/field.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/sky.h"
+#include "renderer/stages/slab_tables.h"
 
 enum { RADIOSITY_PASS_COUNT = 5 };
 
@@ -37,6 +37,6 @@ void radiosity_stage_finish(struct radiosity_stage *stage);
  * for this frame. false (and a log line) when out of memory. */
 bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_context *context, const struct scene *scene,
 			 const struct ground_maps *ground, const struct sky_tables *sky, const struct field_maps *field,
-			 const struct slab_tables *slab, struct radiosity_light *light);
+			 const struct texture *slab_rows, struct radiosity_light *light);
 
 #endif

@@ -1,12 +1,17 @@
-/* Tables of the paper's slab for one sun elevation. */
+/* Rows of the slab over thickness for one sun elevation, of either shading. */
+#include "renderer/stages/slab_tables.h"
+
 #include "renderer/log.h"
 #include "renderer/optics/paper_slab.h"
-#include "renderer/stages/droplets.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 enum { ROW_MULTIPLE_T, ROW_DOUBLE_T, ROW_MULTIPLE_R, ROW_DOUBLE_R, ROW_DIRECTIONAL_T, ROW_SPHERICAL_R };
+
+enum { COLUMNS = SLAB_TABLE_WIDTH };
+
+typedef float slab_row[COLUMNS][4];
 
 /* Gauss-Legendre nodes over a hemisphere's cosine; enough for the smooth shape of double scattering. */
 enum { NODES = 12 };
@@ -16,9 +21,21 @@ static const double node_w[NODES / 2] = {0.2491470458134028, 0.2334925365383548,
 					 0.1600783285433462, 0.1069393259953184, 0.0471753363865118};
 
 struct hemisphere {
-	double mu[NODES], weight[NODES];    /* over 0..1 */
-	double forward[NODES], back[NODES]; /* P_2 averaged over azimuth, light going on and turning back */
+	double mu[NODES], weight[NODES]; /* over 0..1 */
+	/* P_S [0] and P_2 [1] averaged over azimuth, light going on and turning back. */
+	double forward[2][NODES], back[2][NODES];
 };
+
+/* A table in work. */
+struct rows {
+	const struct scene *scene;
+	const struct droplet_tables *tables;
+	double mu_l;
+	double thickness_m[COLUMNS];
+	slab_row *row; /* [SLAB_TABLE_HEIGHT] */
+};
+
+/* --- fluxes of the first two orders' shapes ------------------------------------------------------------------------------------ */
 
 static void hemisphere_nodes(struct hemisphere *h)
 {
@@ -29,23 +46,26 @@ static void hemisphere_nodes(struct hemisphere *h)
 	}
 }
 
-/* Averages over azimuth by the addition theorem: sum (2l+1) chi_l^2 P_l(mu_l) P_l(+-mu_v). 200 terms are plenty for what is integrated
- * next. */
-static void hemisphere_phase2(struct hemisphere *h, const struct optics *optics, int band, double mu_l)
+/* Averages over azimuth by the addition theorem: sum (2l+1) chi_l P_l(mu_l) P_l(+-mu_v), of P_S and, with chi_l^2, of P_2. 200 terms are
+ * plenty for what is integrated next. */
+static void hemisphere_phase(struct hemisphere *h, const struct optics *optics, int band, double mu_l)
 {
 	enum { TERMS = 200 };
 	const int terms = optics->moment_count < TERMS ? optics->moment_count : TERMS;
 	for (int i = 0; i < NODES; i++) {
-		double a0 = 1, a1 = mu_l, b0 = 1, b1 = h->mu[i], even = 0, odd = 0;
+		double a0 = 1, a1 = mu_l, b0 = 1, b1 = h->mu[i], sum[2][2] = {{0}};
 		for (int l = 0; l < terms; l++) {
-			const double chi = optics->moment_modified[band][l];
-			*(l % 2 ? &odd : &even) += (2 * l + 1) * chi * chi * a0 * b0;
+			const double chi = optics->moment_modified[band][l], term = (2 * l + 1) * chi * a0 * b0;
+			sum[0][l % 2] += term;
+			sum[1][l % 2] += chi * term;
 			const double a2 = ((2 * l + 3) * mu_l * a1 - (l + 1) * a0) / (l + 2);
 			const double b2 = ((2 * l + 3) * h->mu[i] * b1 - (l + 1) * b0) / (l + 2);
 			a0 = a1, a1 = a2, b0 = b1, b1 = b2;
 		}
-		h->forward[i] = fmax(0, even + odd);
-		h->back[i] = fmax(0, even - odd);
+		for (int order = 0; order < 2; order++) {
+			h->forward[order][i] = fmax(0, sum[order][0] + sum[order][1]);
+			h->back[order][i] = fmax(0, sum[order][0] - sum[order][1]);
+		}
 	}
 }
 
@@ -60,15 +80,15 @@ static double single_transmitted(double tau, double mu_l, double mu_v)
 	return tau / mu_v * exp(-tau * a) * (x < 1e-6 ? 1 - x / 2 : -expm1(-x) / x);
 }
 
-/* Flux, as a fraction of the sun's on the slab, of single scattering's shape with P_2. */
-static void double_fluxes(const struct hemisphere *h, double tau, double mu_l, double *transmitted, double *reflected)
+/* Flux, as a fraction of the sun's on the slab, of single scattering's shape with P_S (order 0) or P_2 (1). */
+static void shape_fluxes(const struct hemisphere *h, int order, double tau, double mu_l, double *transmitted, double *reflected)
 {
 	*transmitted = *reflected = 0;
 	for (int i = 0; i < NODES; i++) {
 		/* 2 pi mu dmu / (4 pi), over mu_l. */
 		const double weight = 0.5 * h->weight[i] * h->mu[i] / mu_l;
-		*transmitted += weight * h->forward[i] * single_transmitted(tau, mu_l, h->mu[i]);
-		*reflected += weight * h->back[i] * single_reflected(tau, mu_l, h->mu[i]);
+		*transmitted += weight * h->forward[order][i] * single_transmitted(tau, mu_l, h->mu[i]);
+		*reflected += weight * h->back[order][i] * single_reflected(tau, mu_l, h->mu[i]);
 	}
 }
 
@@ -78,104 +98,190 @@ static double double_scale(double wanted, double flux)
 	return flux > 1e-12 ? fmin(wanted / flux, 4) : 0;
 }
 
-static void fill_column(float (*rows)[SLAB_SUN_WIDTH][4], int column, int band, double thickness, const struct optics *optics,
-			const struct paper_fit *fit, const struct hemisphere *h, double mu_l)
+/* --- the paper's shading -------------------------------------------------------------------------------------------------------- */
+
+static void paper_fill_columns(const struct rows *rows, int band, const struct hemisphere *h)
 {
-	const double kappa = optics->extinction_per_m[band];
-	const double tau_modified = kappa * (1 - optics->forward_peak_fraction[band]) * thickness;
-	const double similar = thickness * kappa / PAPER_EXTINCTION_PER_M;
+	const struct optics *optics = rows->tables->optics;
+	const double kappa = optics->extinction_per_m[band], kappa_s = kappa * (1 - optics->forward_peak_fraction[band]);
+	const double mu_l = rows->mu_l;
+	struct paper_fit fit = paper_fit_at(acos(mu_l));
 	/* T_ms is similar in kappa H, the orders 1 and 2 in kappa_S H. */
-	struct paper_fit similar_fit = *fit;
-	similar_fit.kappa_c *= (1 - optics->forward_peak_fraction[band]) * PAPER_EXTINCTION_PER_M / PAPER_MODIFIED_EXTINCTION_PER_M;
-	const struct paper_orders orders = paper_orders_at(&similar_fit, similar, tau_modified / mu_l);
-	double flux_t, flux_r;
-	double_fluxes(h, tau_modified, mu_l, &flux_t, &flux_r);
-	rows[ROW_MULTIPLE_T][column][band] = (float)orders.t[3];
-	rows[ROW_DOUBLE_T][column][band] = (float)double_scale(orders.t[2], flux_t);
-	rows[ROW_MULTIPLE_R][column][band] = (float)orders.r[3];
-	rows[ROW_DOUBLE_R][column][band] = (float)double_scale(orders.r[2], flux_r);
-	rows[ROW_DIRECTIONAL_T][column][band] = (float)fmin(1, orders.t[0] + orders.t[1] + orders.t[2]);
-	rows[ROW_SPHERICAL_R][column][band] = (float)(1 - paper_spherical_transmittance(similar));
+	fit.kappa_c *= kappa_s / kappa * PAPER_EXTINCTION_PER_M / PAPER_MODIFIED_EXTINCTION_PER_M;
+	for (int i = 0; i < COLUMNS; i++) {
+		const double similar = rows->thickness_m[i] * kappa / PAPER_EXTINCTION_PER_M;
+		const double tau_modified = kappa_s * rows->thickness_m[i];
+		const struct paper_orders orders = paper_orders_at(&fit, similar, tau_modified / mu_l);
+		double flux_t, flux_r;
+		shape_fluxes(h, 1, tau_modified, mu_l, &flux_t, &flux_r);
+		rows->row[ROW_MULTIPLE_T][i][band] = (float)orders.t[3];
+		rows->row[ROW_DOUBLE_T][i][band] = (float)double_scale(orders.t[2], flux_t);
+		rows->row[ROW_MULTIPLE_R][i][band] = (float)orders.r[3];
+		rows->row[ROW_DOUBLE_R][i][band] = (float)double_scale(orders.r[2], flux_r);
+		rows->row[ROW_DIRECTIONAL_T][i][band] = (float)fmin(1, orders.t[0] + orders.t[1] + orders.t[2]);
+		rows->row[ROW_SPHERICAL_R][i][band] = (float)(1 - paper_spherical_transmittance(similar));
+	}
 }
 
-static bool upload_sun(struct slab_tables *tables, const struct scene *scene, const struct optics *optics)
+/* Share of diffuse light that goes through, of that which meets droplets. */
+static double share_of(double transmittance, double slant_depth)
 {
-	float(*rows)[SLAB_SUN_WIDTH][4] = calloc(SLAB_SUN_ROWS, sizeof *rows);
-	if (!rows)
-		return false;
-	/* A sun below the horizon lights the layer from below; the table is the same by symmetry. */
-	const double mu_l = fmax(0.02, fabs(sin(scene->sun.elevation_deg * M_PI / 180)));
-	const struct paper_fit fit = paper_fit_at(acos(mu_l));
-	struct hemisphere h;
-	hemisphere_nodes(&h);
+	return fmin(fmax((transmittance - exp(-slant_depth)) / -expm1(-slant_depth), 0), 1);
+}
+
+static void paper_fill_shares(const struct rows *rows, int band)
+{
+	const struct optics *optics = rows->tables->optics;
+	const double kappa = optics->extinction_per_m[band], kappa_s = kappa * (1 - optics->forward_peak_fraction[band]);
+	for (int view = 0; view < SLAB_SLICE_VIEW_COUNT; view++) {
+		const double zenith = slab_slice_zenith(view), mu = fmax(cos(zenith), 0.01);
+		const struct paper_fit fit = paper_fit_at(acos(mu));
+		for (int i = 0; i < COLUMNS; i++) {
+			const double h = fmax(rows->thickness_m[i], 1e-3);
+			rows->row[SLAB_TABLE_SINGLE + view][i][band] =
+				(float)share_of(paper_transmittance(&fit, h * kappa / PAPER_EXTINCTION_PER_M), kappa_s * h / mu);
+		}
+	}
+}
+
+/* --- the solved shading --------------------------------------------------------------------------------------------------------- */
+
+/* Scales of double scattering, which only layers of a picture ask for: by successive orders at a few thicknesses, in between linear. */
+static void solved_fill_scales(const struct rows *rows, const struct hemisphere *h)
+{
+	enum { KNOTS = 15, STEP = COLUMNS / KNOTS };
+	const struct optics *optics = rows->tables->optics;
+	double knot[KNOTS + 1][2] = {{0}};
+	_Static_assert(KNOTS * STEP == COLUMNS - 1, "knots at columns, the last included");
+	for (int k = 1; k <= KNOTS; k++) {
+		const double tau = optics->extinction_per_m[1] * rows->thickness_m[k * STEP];
+		const struct slab_orders orders = slab_orders_at(optics, 1, SLAB_PHASE_MODIFIED, tau, rows->mu_l);
+		double flux_t, flux_r;
+		shape_fluxes(h, 1, (1 - optics->forward_peak_fraction[1]) * tau, rows->mu_l, &flux_t, &flux_r);
+		knot[k][0] = double_scale(orders.t[2], flux_t);
+		knot[k][1] = double_scale(orders.r[2], flux_r);
+	}
+	for (int i = 0; i < COLUMNS; i++) {
+		const int k = i < COLUMNS - 1 ? i / STEP : KNOTS - 1;
+		const double share = (double)(i - k * STEP) / STEP;
+		for (int band = 0; band < BAND_COUNT; band++) {
+			rows->row[ROW_DOUBLE_T][i][band] = (float)((1 - share) * knot[k][0] + share * knot[k + 1][0]);
+			rows->row[ROW_DOUBLE_R][i][band] = (float)((1 - share) * knot[k][1] + share * knot[k + 1][1]);
+		}
+	}
+}
+
+/* Directional here is what went on straight or was turned once; what was turned twice arrives at the ground from so wide a field that it
+ * belongs to the diffuse light. */
+static void solved_fill_columns(const struct rows *rows, int band, const struct hemisphere *h)
+{
+	const struct optics *optics = rows->tables->optics;
+	const double kappa = optics->extinction_per_m[band], kappa_s = kappa * (1 - optics->forward_peak_fraction[band]);
+	double tau[COLUMNS];
+	struct slab_flux flux[COLUMNS];
+	for (int i = 0; i < COLUMNS; i++)
+		tau[i] = kappa * rows->thickness_m[i];
+	slab_flux_row(rows->tables->slab, band, rows->mu_l, tau, COLUMNS, flux);
+	for (int i = 0; i < COLUMNS; i++) {
+		double t1, r1;
+		shape_fluxes(h, 0, kappa_s * rows->thickness_m[i], rows->mu_l, &t1, &r1);
+		const double directional = fmin(exp(-kappa_s * rows->thickness_m[i] / rows->mu_l) + t1, flux[i].transmitted);
+		rows->row[ROW_DIRECTIONAL_T][i][band] = (float)directional;
+		rows->row[ROW_MULTIPLE_T][i][band] = (float)(flux[i].transmitted - directional);
+		rows->row[ROW_MULTIPLE_R][i][band] = (float)fmax(flux[i].reflected - r1, 0);
+		rows->row[ROW_SPHERICAL_R][i][band] = (float)slab_spherical_albedo(rows->tables->slab, band, tau[i]);
+	}
+}
+
+static void solved_fill_shares(const struct rows *rows, int band)
+{
+	const struct slab_band *slab = &rows->tables->slab->band[band];
+	const double kappa = rows->tables->optics->extinction_per_m[band];
+	double tau[COLUMNS];
+	struct slab_flux flux[COLUMNS];
+	for (int i = 0; i < COLUMNS; i++)
+		tau[i] = fmax(kappa * rows->thickness_m[i], 1e-6);
+	for (int view = 0; view < SLAB_SLICE_VIEW_COUNT; view++) {
+		const double mu = fmax(cos(slab_slice_zenith(view)), 0.01);
+		slab_flux_row(rows->tables->slab, band, mu, tau, COLUMNS, flux);
+		for (int i = 0; i < COLUMNS; i++)
+			rows->row[SLAB_TABLE_SINGLE + view][i][band] =
+				(float)share_of(flux[i].transmitted, (1 - slab->truncated) * tau[i] / mu);
+	}
+}
+
+/* ---------------------------------------------------------------------------------------------------------------------------------- */
+
+static bool wants_layers(const struct scene *scene)
+{
+	return scene->output.layers != 1u << LAYER_COLOR;
+}
+
+static void fill(const struct rows *rows)
+{
+	struct hemisphere h[BAND_COUNT];
 	for (int band = 0; band < BAND_COUNT; band++) {
-		hemisphere_phase2(&h, optics, band, mu_l);
-		for (int i = 0; i < SLAB_SUN_WIDTH; i++) {
-			const double unit = (double)i / (SLAB_SUN_WIDTH - 1);
-			fill_column(rows, i, band, unit * unit * scene->clouds.thickness_m, optics, &fit, &h, mu_l);
+		hemisphere_nodes(&h[band]);
+		hemisphere_phase(&h[band], rows->tables->optics, band, rows->mu_l);
+		if (rows->scene->model.shading == SHADING_PAPER) {
+			paper_fill_columns(rows, band, &h[band]);
+			paper_fill_shares(rows, band);
+		} else {
+			solved_fill_columns(rows, band, &h[band]);
+			solved_fill_shares(rows, band);
 		}
 	}
-	const bool ok = texture_init(&tables->sun, SLAB_SUN_WIDTH, SLAB_SUN_ROWS, TEXTURE_RGBA32F, 0);
+	if (rows->scene->model.shading == SHADING_SOLVED && wants_layers(rows->scene))
+		solved_fill_scales(rows, &h[1]);
+}
+
+static void rows_destroy(void *value)
+{
+	struct texture *texture = value;
+	texture_finish(texture);
+	free(texture);
+}
+
+static struct texture *rows_create(const struct scene *scene, const struct droplet_tables *tables)
+{
+	/* A sun below the horizon lights the layer from below; the table is the same by symmetry. */
+	struct rows rows = {.scene = scene, .tables = tables, .mu_l = fmax(0.02, fabs(sin(scene->sun.elevation_deg * M_PI / 180)))};
+	struct texture *texture = calloc(1, sizeof *texture);
+	rows.row = calloc(SLAB_TABLE_HEIGHT, sizeof *rows.row);
+	bool ok = texture && rows.row;
+	for (int i = 0; i < COLUMNS; i++) {
+		const double unit = (double)i / (COLUMNS - 1);
+		rows.thickness_m[i] = unit * unit * scene->clouds.thickness_m;
+	}
+	if (ok) {
+		fill(&rows);
+		ok = texture_init(texture, COLUMNS, SLAB_TABLE_HEIGHT, TEXTURE_RGBA32F, 0);
+	}
 	if (ok)
-		texture_upload(&tables->sun, &rows[0][0][0]);
-	free(rows);
-	return ok;
-}
-
-static bool upload_view(struct slab_tables *tables)
-{
-	float texels[SLAB_VIEW_SIZE][SLAB_VIEW_SIZE];
-	for (int y = 0; y < SLAB_VIEW_SIZE; y++) {
-		const struct paper_fit fit = paper_fit_at(y * (M_PI / 2) / (SLAB_VIEW_SIZE - 1));
-		for (int x = 0; x < SLAB_VIEW_SIZE; x++) {
-			const double unit = (double)x / (SLAB_VIEW_SIZE - 1);
-			texels[y][x] = (float)paper_transmittance(&fit, unit * unit * SLAB_VIEW_THICKNESS_M);
-		}
+		texture_upload(texture, &rows.row[0][0][0]);
+	free(rows.row);
+	if (!ok) {
+		free(texture);
+		texture = NULL;
 	}
-	if (!texture_init(&tables->view, SLAB_VIEW_SIZE, SLAB_VIEW_SIZE, TEXTURE_R32F, 0))
-		return false;
-	texture_upload(&tables->view, &texels[0][0]);
-	return true;
+	return texture;
 }
 
-static void slab_tables_destroy(void *value)
+const struct texture *slab_rows_get(struct stage_context *context, const struct scene *scene, const struct droplets *droplets)
 {
-	struct slab_tables *tables = value;
-	if (!tables)
-		return;
-	texture_finish(&tables->view);
-	texture_finish(&tables->sun);
-	free(tables);
-}
-
-static struct slab_tables *slab_tables_create(const struct scene *scene, const struct optics *optics)
-{
-	struct slab_tables *tables = calloc(1, sizeof *tables);
-	if (!tables || !upload_sun(tables, scene, optics) || !upload_view(tables)) {
-		log_error("slab tables: out of memory");
-		slab_tables_destroy(tables);
-		return NULL;
-	}
-	return tables;
-}
-
-const struct slab_tables *slab_tables_get(struct stage_context *context, const struct scene *scene, const struct droplets *droplets)
-{
-	const struct optics *optics = droplets->optics;
-	context->block.extinction[3] = (float)(optics->extinction_per_m[1] / PAPER_EXTINCTION_PER_M);
-
 	struct cache_key key = cache_key_make("slab");
-	const double inputs[] = {scene->dsd.n0_per_cm3, scene->dsd.gamma,         scene->dsd.effective_radius_um, scene->model.optics,
-				 scene->model.shading,  scene->sun.elevation_deg, scene->clouds.thickness_m};
+	droplets_key_add(&key, scene);
+	const double inputs[] = {scene->model.shading, scene->sun.elevation_deg, scene->clouds.thickness_m, wants_layers(scene)};
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
-	struct slab_tables *tables = cache_find(context->cache, &key);
-	if (!tables) {
-		context->reused = false;
-		tables = slab_tables_create(scene, optics);
-		if (tables && !cache_keep(context->cache, &key, tables, texture_bytes(&tables->sun) + texture_bytes(&tables->view),
-					  slab_tables_destroy))
-			return NULL;
+	struct texture *texture = cache_find(context->cache, &key);
+	if (texture)
+		return texture;
+	context->reused = false;
+	texture = rows_create(scene, droplets->tables);
+	if (!texture || !cache_keep(context->cache, &key, texture, texture_bytes(texture), rows_destroy)) {
+		log_error("slab tables: out of memory");
+		return NULL;
 	}
-	return tables;
+	return texture;
 }

@@ -10,38 +10,50 @@
 
 /* OpenGL grants 16 samplers; each side leaves some out. */
 #define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "ground_relief"
-#define CLOUD_SAMPLERS                                                                                                                     \
-	"field_coarse", "field_detail", "phase_table", "slab_sun_table", "slab_view_table", "ground_received", "cloud_received"
+#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received", "height_table"
 
 static const struct {
 	const char *defines;
 	const char *samplers[PASS_SAMPLERS_MAX];
 } sides[VIEW_SIDES] = {
 	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
-	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n",
-			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "forward_peak_table", "forward_blur_table"}},
-	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
-			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_table", "height_maximum"}},
+	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS, CLOUD_SAMPLERS, "field_coarse", "field_detail"}},
+	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n", {COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_maximum"}},
 };
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
 
-static struct pass *create_pass(const struct pass_compiler *compiler, enum view_side side, enum view_region region, int outputs)
+/* outputs 1: the color alone. */
+static struct pass *create_pass(const struct pass_compiler *compiler, enum shading shading, enum view_side side, enum view_region region,
+				int outputs)
 {
-	char defines[160];
+	char defines[256];
 	struct pass_desc desc = {.file = "shaders/passes/view.glsl", .defines = defines, .outputs = outputs};
-	snprintf(defines, sizeof defines, "%s#define VIEW_REGION %d\n#define OUTPUTS %d\n", sides[side].defines, region, outputs);
+	snprintf(defines, sizeof defines, "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_COLOR_ONLY %d\n",
+		 sides[side].defines, region, shading == SHADING_SOLVED, outputs == 1);
 	memcpy(desc.samplers, sides[side].samplers, sizeof desc.samplers);
 	return pass_create(compiler, &desc);
+}
+
+/* A clear sky has no shading; its passes are kept under the first. */
+static enum shading shading_of(const struct scene *scene, enum view_side side)
+{
+	return side == VIEW_CLEAR ? 0 : scene->model.shading;
+}
+
+static bool create_side(struct view_stage *stage, const struct pass_compiler *compiler, enum shading shading, enum view_side side)
+{
+	for (int region = 0; region < VIEW_REGIONS; region++)
+		if (!(stage->color[shading][side][region] = create_pass(compiler, shading, side, region, 1)))
+			return false;
+	return (stage->layers[shading][side] = create_pass(compiler, shading, side, VIEW_MIXED, VIEW_OUTPUTS)) != NULL;
 }
 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
-	for (int side = 0; ok && side < VIEW_SIDES; side++) {
-		for (int region = 0; ok && region < VIEW_REGIONS; region++)
-			ok = (stage->passes[side][region] = create_pass(compiler, side, region, 1)) != NULL;
-		ok = ok && (stage->several[side] = create_pass(compiler, side, VIEW_MIXED, VIEW_OUTPUTS)) != NULL;
-	}
+	for (int shading = 0; ok && shading < SHADING_COUNT; shading++)
+		for (int side = 0; ok && side < VIEW_SIDES; side++)
+			ok = (side == VIEW_CLEAR && shading > 0) || create_side(stage, compiler, shading, side);
 	if (!ok)
 		view_stage_finish(stage);
 	return ok;
@@ -49,11 +61,12 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	for (int side = 0; side < VIEW_SIDES; side++) {
-		pass_destroy(stage->several[side]);
-		for (int region = 0; region < VIEW_REGIONS; region++)
-			pass_destroy(stage->passes[side][region]);
-	}
+	for (int shading = 0; shading < SHADING_COUNT; shading++)
+		for (int side = 0; side < VIEW_SIDES; side++) {
+			pass_destroy(stage->layers[shading][side]);
+			for (int region = 0; region < VIEW_REGIONS; region++)
+				pass_destroy(stage->color[shading][side][region]);
+		}
 	pass_destroy(stage->develop);
 	*stage = (struct view_stage){0};
 }
@@ -143,25 +156,23 @@ static enum view_side side_of(const struct scene *scene, const struct view_input
 /* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
 static void bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
 {
-	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,      in->sky->to_layer,
-					  in->sky->to_end,        in->ground->map, in->ground->relief, NULL};
-	int n = 0;
-	for (; common[n]; n++)
-		run->samplers[n] = common[n];
+	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,     in->sky->to_layer,
+					  in->sky->to_end,        in->ground->map, in->ground->relief};
+	const int common_count = sizeof common / sizeof *common;
+	memcpy(run->samplers, common, sizeof common);
 	if (side == VIEW_CLEAR)
 		return;
-	const struct texture *clouds[] = {in->field->coarse,
-					  in->field->detail,
-					  &in->droplets->phase,
-					  &in->slab->sun,
-					  &in->slab->view,
+	const bool above = side == VIEW_ABOVE;
+	const struct texture *clouds[] = {&in->droplets->phase,
+					  &in->droplets->events,
+					  in->slab_rows,
+					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  side == VIEW_ABOVE ? in->field->height : &in->droplets->forward_peak,
-					  side == VIEW_ABOVE ? in->field->maximum : &in->droplets->forward_blur,
-					  NULL};
-	for (int i = 0; clouds[i]; i++)
-		run->samplers[n++] = clouds[i];
+					  in->field->height,
+					  above ? in->field->maximum : in->field->coarse,
+					  above ? NULL : in->field->detail};
+	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
 /* Sine of the (negative) elevation of the horizon of a sphere `height` above the ground, seen from the camera; 1 from inside it. */
@@ -200,7 +211,8 @@ static enum view_region region_of_row(const struct scene_block *block, enum view
 }
 
 /* Runs over rows of one kind after the other, each with the program made for it. */
-static void run_regions(const struct view_stage *stage, const struct stage_context *context, enum view_side side, struct pass_run *run)
+static void run_regions(struct pass *const passes[VIEW_REGIONS], const struct stage_context *context, enum view_side side,
+			struct pass_run *run)
 {
 	const int height = run->targets[0]->height;
 	run->width = run->targets[0]->width;
@@ -211,18 +223,19 @@ static void run_regions(const struct view_stage *stage, const struct stage_conte
 			end++;
 		run->first_row = first;
 		run->height = end - first;
-		pass_run(stage->passes[side][region], run);
+		pass_run(passes[region], run);
 		first = end;
 	}
 }
 
-/* Renders `count` layers (1 or VIEW_OUTPUTS) in one pass and hands them to the cache. */
+/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. */
 static bool run_group(const struct view_stage *stage, struct stage_context *context, const struct scene *scene,
 		      const struct view_inputs *inputs, const enum layer *layers, int count, const struct texture **pictures)
 {
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
 	const enum view_side side = side_of(scene, inputs);
+	const enum shading shading = shading_of(scene, side);
 	bind_inputs(&run, side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
@@ -230,10 +243,10 @@ static bool run_group(const struct view_stage *stage, struct stage_context *cont
 		if (!targets[i])
 			goto fail;
 	}
-	if (count == 1)
-		run_regions(stage, context, side, &run);
+	if (count == 1 && layers[0] == LAYER_COLOR)
+		run_regions(stage->color[shading][side], context, side, &run);
 	else
-		pass_run(stage->several[side], &run);
+		pass_run(stage->layers[shading][side], &run);
 	for (int i = 0; i < count; i++) {
 		const struct cache_key key = make_key(scene, layers[i]);
 		struct texture *picture = targets[i];
@@ -270,7 +283,7 @@ bool view_stage_run(const struct view_stage *stage, struct stage_context *contex
 	for (int i = 0; i < missing_count;) {
 		if (cancelled && cancelled(cancel_context))
 			return false;
-		const int group = missing_count - i >= VIEW_OUTPUTS ? VIEW_OUTPUTS : 1;
+		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
 		if (!run_group(stage, context, scene, inputs, missing + i, group, made))
 			return false;

@@ -7,7 +7,7 @@
 
 #include "renderer/stages/radiosity.h"
 
-/* The view pass exists with one output, for each part of the picture, and with several for the whole. */
+/* The view pass exists for the color alone, for each part of the picture, and with several layers for the whole. */
 enum { VIEW_OUTPUTS = 4 };
 
 /* Where the camera is. */
@@ -17,15 +17,15 @@ enum view_side { VIEW_CLEAR, VIEW_BELOW, VIEW_ABOVE, VIEW_SIDES };
 enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 
 struct view_stage {
-	struct pass *passes[VIEW_SIDES][VIEW_REGIONS]; /* one output */
-	struct pass *several[VIEW_SIDES];              /* VIEW_OUTPUTS outputs */
+	struct pass *color[SHADING_COUNT][VIEW_SIDES][VIEW_REGIONS];
+	struct pass *layers[SHADING_COUNT][VIEW_SIDES]; /* VIEW_OUTPUTS outputs */
 	struct pass *develop;
 };
 
 struct view_inputs {
 	const struct ground_maps *ground;
 	const struct droplets *droplets;
-	const struct slab_tables *slab;
+	const struct texture *slab_rows, *slab_slices; /* the second NULL in the paper's shading */
 	const struct sky_tables *sky;
 	const struct field_maps *field;
 	const struct radiosity_light *light; /* NULL without clouds */

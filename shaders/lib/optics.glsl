@@ -5,14 +5,17 @@
 
 #ifndef __cplusplus
 uniform sampler2D phase_table;
-uniform sampler2D forward_peak_table;
-uniform sampler2D forward_blur_table;
+uniform sampler2D event_table;
 #endif
 
 const float FORWARD_PEAK_SINE = 0.04361939; // of half the peak's 5 degrees
-const float FORWARD_ANGLE_MAX = 0.6;
-const vec2 FORWARD_PEAK_SIZE = vec2(128.0, 32.0);
-const vec2 FORWARD_BLUR_SIZE = vec2(256.0, 32.0);
+const float FORWARD_PEAK_REACH = 0.6;
+// The event table holds four tables over angle and depth on each other, EVENT_DEPTHS rows each: forward peak, forward blur, and the
+// residuals of reflection and transmission (shaders/lib/slab_solved.glsl).
+const vec2 EVENT_TABLE_SIZE = vec2(512.0, 128.0);
+const float EVENT_DEPTHS = 32.0;
+const float FORWARD_PEAK_WIDTH = 128.0;
+const float FORWARD_BLUR_WIDTH = 256.0;
 const float PHASE_TABLE_WIDTH = 2048.0;
 
 // Sine and cosine of half the scattering angle between two unit vectors, the direction of light before and after: exact at both ends, where the
@@ -42,10 +45,15 @@ vec3 phase_twice(vec2 half_angle)
 	return exp2(vec3(textureLod(phase_table, vec2(x, 0.75), 0.0)));
 }
 
-float forward_depth(float s)
+// Texel centre `column` of table `part`, at row 0..EVENT_DEPTHS-1.
+vec3 event_at(float part, float column, float row)
 {
-	float w = s / (s + 4.0);
-	return clamp(w, 0.5 / FORWARD_PEAK_SIZE.y, 1.0 - 0.5 / FORWARD_PEAK_SIZE.y);
+	return vec3(textureLod(event_table, (vec2(column, part * EVENT_DEPTHS + row) + 0.5) / EVENT_TABLE_SIZE, 0.0));
+}
+
+float forward_row(float s)
+{
+	return clamp(s / (s + 4.0) * EVENT_DEPTHS - 0.5, 0.0, EVENT_DEPTHS - 1.0);
 }
 
 // Radiance per irradiance (1/sr) of light that met forward events alone, two or more, on a path of optical length s (full extinction).
@@ -53,15 +61,14 @@ vec3 forward_peak(vec2 half_angle, float s)
 {
 	// 2 arcsin to fourth order, good to 1e-4 over the table's 0.6 rad.
 	float angle = 2.0 * half_angle.x * (1.0 + half_angle.x * half_angle.x * (1.0 / 6.0));
-	float unit = sqrt(min(angle / FORWARD_ANGLE_MAX, 1.0));
-	vec3 peak = vec3(textureLod(forward_peak_table, vec2((0.5 + unit * (FORWARD_PEAK_SIZE.x - 1.0)) / FORWARD_PEAK_SIZE.x, forward_depth(s)), 0.0));
+	float unit = sqrt(min(angle / FORWARD_PEAK_REACH, 1.0));
+	vec3 peak = event_at(0.0, unit * (FORWARD_PEAK_WIDTH - 1.0), forward_row(s));
 	return unit < 1.0 && half_angle.x < half_angle.y ? peak : vec3(0.0);
 }
 
 // What forward events of a path of optical length s add to the phase function of its one other event.
 vec3 forward_blur(vec2 half_angle, float s)
 {
-	float x = (0.5 + phase_unit(half_angle) * (FORWARD_BLUR_SIZE.x - 1.0)) / FORWARD_BLUR_SIZE.x;
-	return vec3(textureLod(forward_blur_table, vec2(x, forward_depth(s)), 0.0));
+	return event_at(1.0, phase_unit(half_angle) * (FORWARD_BLUR_WIDTH - 1.0), forward_row(s));
 }
 #endif

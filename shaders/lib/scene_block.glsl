@@ -25,6 +25,9 @@ layout(std140, binding = 0) uniform scene_block {
 	vec4 cloud_threshold;
 	vec4 extinction;
 	vec4 extinction_modified;
+	vec4 extinction_scaled;
+	vec4 slab_slice_range;
+	vec4 slab_light;
 	vec4 sky_irradiance_cloud;
 	vec4 sky_irradiance_ground;
 	vec4 air_below;

@@ -5,8 +5,7 @@
 #include "shaders/lib/optics.glsl"
 
 #ifndef __cplusplus
-uniform sampler2D slab_sun_table;
-uniform sampler2D slab_view_table;
+uniform sampler2D slab_table;
 #endif
 
 // Single scattering in reflection over P/(4 pi): mu_l / (mu_l + mu_v) (1 - exp(-tau (1/mu_l + 1/mu_v))).
@@ -28,48 +27,52 @@ vec3 slab_single_transmitted(vec3 tau, float mu_l, float mu_v)
 	return tau / mu_v * exp(-tau * a) * ratio;
 }
 
-// --- tables over thickness, columns over the square root of H over its maximum -------------------------------------------------
+// --- table over thickness: columns over the square root of H over its maximum, rows of single quantities, then one per view zenith ---
 
-const float SLAB_SUN_WIDTH = 256.0;
-const float SLAB_SUN_ROWS = 6.0;
-const float SLAB_VIEW_SIZE = 64.0;
-const float SLAB_VIEW_THICKNESS = 4000.0;
+const vec2 SLAB_TABLE_SIZE = vec2(256.0, 38.0);
+const float SLAB_TABLE_SINGLE = 6.0;
+const float SLAB_VIEWS = 32.0;
 
-vec3 slab_sun_row(float thickness, float row)
+vec3 slab_row(float thickness, float row)
 {
 	float unit = sqrt(clamp(thickness / max(cloud_layer.y, 1e-3), 0.0, 1.0));
-	return vec3(textureLod(slab_sun_table, vec2((0.5 + unit * (SLAB_SUN_WIDTH - 1.0)) / SLAB_SUN_WIDTH, (row + 0.5) / SLAB_SUN_ROWS), 0.0));
+	return vec3(textureLod(slab_table, (vec2(unit * (SLAB_TABLE_SIZE.x - 1.0), row) + 0.5) / SLAB_TABLE_SIZE, 0.0));
 }
 
-// Fraction of the sun's flux on the slab that leaves it, scattered three times and oftener, through the other side or back.
+// Fraction of the sun's flux on the slab that leaves it as diffuse light through the other side, or back: scattered three times and oftener in
+// the paper's model, all that is not slab_directional_transmittance in the solved one.
 vec3 slab_multiple(float thickness, bool through)
 {
-	return slab_sun_row(thickness, through ? 0.0 : 2.0);
+	return slab_row(thickness, through ? 0.0 : 2.0);
 }
 
 // Factor that gives double scattering, of single scattering's shape and P_2, its flux T_2 or R_2.
 vec3 slab_double_scale(float thickness, bool through)
 {
-	return slab_sun_row(thickness, through ? 1.0 : 3.0);
+	return slab_row(thickness, through ? 1.0 : 3.0);
 }
 
-// T_0 + T_1 + T_2, what goes on nearly along the beam.
+// What goes on nearly along the beam: T_0 + T_1 + T_2 in the paper's model, T_0 + T_1 in the solved one.
 vec3 slab_directional_transmittance(float thickness)
 {
-	return slab_sun_row(thickness, 4.0);
+	return slab_row(thickness, 4.0);
 }
 
 // Albedo for uniform diffuse light.
 vec3 slab_spherical_albedo(float thickness)
 {
-	return slab_sun_row(thickness, 5.0);
+	return slab_row(thickness, 5.0);
 }
 
-// Plane transmittance T_ms for light from (by reciprocity: seen under) cosine mu.
-float slab_plane_transmittance(float thickness, float mu)
+// Index of a view's zenith angle in the tables, denser towards the horizon: the angle is pi/2 sin(pi/2 i/(SLAB_VIEWS-1)).
+float slab_view_index(float mu_v)
 {
-	float x = sqrt(clamp(thickness * extinction.w / SLAB_VIEW_THICKNESS, 0.0, 1.0));
-	vec2 at = vec2(x, acos(clamp(mu, 0.0, 1.0)) / (0.5 * PI));
-	return textureLod(slab_view_table, (0.5 + at * (SLAB_VIEW_SIZE - 1.0)) / SLAB_VIEW_SIZE, 0.0).x;
+	return (SLAB_VIEWS - 1.0) * (2.0 / PI) * asin(min(acos(clamp(mu_v, 0.0, 1.0)) * (2.0 / PI), 1.0));
+}
+
+// Of uniform diffuse light that meets droplets on its way, the share that is seen through the layer; the rest is seen reflected by it.
+vec3 slab_diffuse_share(float thickness, float view_index)
+{
+	return slab_row(thickness, SLAB_TABLE_SINGLE + view_index);
 }
 #endif

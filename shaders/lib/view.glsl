@@ -6,7 +6,7 @@
 #include "shaders/lib/ground.glsl"
 #include "shaders/lib/height.glsl"
 #include "shaders/lib/sky_table.glsl"
-#include "shaders/lib/slab.glsl"
+#include "shaders/lib/slab_solved.glsl"
 #include "shaders/lib/sunlight.glsl"
 
 #ifndef __cplusplus
@@ -53,6 +53,18 @@ vec3 view_sun_disc(vec3 direction)
 	return vec3(sun_at_camera) * (cover * limb / (PI * radius * radius));
 }
 
+#if VIEW_CLOUDS
+// Thickness H at a place. From above it is that of the height field, which the view meets too.
+float view_thickness(vec2 place, float footprint)
+{
+#if VIEW_ABOVE
+	return height_at(place, footprint);
+#else
+	return field_thickness(place, footprint);
+#endif
+}
+#endif
+
 // Radiance of the ground under sun, sky and clouds, before the air between.
 vec3 view_ground(vec2 place, float footprint, float mu_sun)
 {
@@ -64,41 +76,168 @@ vec3 view_ground(vec2 place, float footprint, float mu_sun)
 		// The beam passed the layer where the parallax says; its shadow is as soft as the sun is wide.
 		vec2 through = place + vec2(sun_direction) * cloud_layer.x / max(sun_direction.z, 0.02);
 		float penumbra = 2.0 * sun_direction.w * cloud_layer.x;
-		direct *= slab_directional_transmittance(field_thickness(through, max(footprint, penumbra)));
+		direct *= slab_directional_transmittance(view_thickness(through, max(footprint, penumbra)));
 	}
 #endif
 	return ground_reflectance(place, footprint) * (received + direct) / PI;
 }
 
-// Light of the sun that the layer sends to the viewer, per irradiance `sun` on a plane normal to the beam.
-// through: sun and viewer are on different sides. mu_l: cosine of the sun to the vertical; mu_l_facet, mu_v_facet: cosines to the surface's normal, for the orders 1
-// and 2; depth_scale: thickness along that normal over H.
-void view_layer_sunlight(vec3 direction, bool through, float thickness, float depth_scale, float mu_l, float mu_l_facet, float mu_v_facet, vec3 sun,
-                         INOUT(view_parts) parts)
+#if VIEW_CLOUDS
+// A point of the layer as it is seen.
+struct view_point {
+	float thickness;        // H, m
+	float smooth_thickness; // H evened out over the way that light goes sideways, m
+	float mu_v;             // cosine of the view to the local vertical, positive
+	float view_index;
+	float mu_sun;      // of the sun, negative below the layer's horizon
+	float cos_azimuth; // between the headings of light before and after
+	vec2 half_angle;   // of scattering
+	float depth_facet; // thickness along the normal of the surface over H, and cosines to it; 1 and those above on a flat base
+	float mu_l_facet;
+	float mu_v_facet;
+};
+
+// cos_view: cosine of the viewing direction to the local vertical, positive upwards.
+float view_cos_azimuth(vec3 direction, float cos_view, float mu_sun)
 {
-	vec2 angle = scattering_half_angle(-vec3(sun_direction), -direction);
-	// A facet turned away from light or view is faded out instead of cut.
-	float facing = smoothstep(-0.05, 0.15, mu_l_facet) * smoothstep(-0.05, 0.10, mu_v_facet);
-	float m_l = max(mu_l_facet, 0.03);
-	float m_v = max(mu_v_facet, 0.03);
-	vec3 tau = vec3(extinction_modified) * (thickness * depth_scale);
+	float sines = sqrt(max((1.0 - cos_view * cos_view) * (1.0 - mu_sun * mu_sun), 1e-8));
+	return (dot(direction, vec3(sun_direction)) - cos_view * mu_sun) / sines;
+}
+
+// Cosine under which a side of the layer is lit. Base and top undulate, so that at the terminator both get some light.
+const float VIEW_TERMINATOR = 0.06;
+
+float view_lit_cosine(float mu)
+{
+	float x = max(mu + VIEW_TERMINATOR, 0.0);
+	return mu > VIEW_TERMINATOR ? mu : x * x * (0.25 / VIEW_TERMINATOR);
+}
+
+// Orders 0 to 2 of the modified phase function, per irradiance 1: what the paper's model is made of, and how the solved sum is shared out to layers.
+struct view_orders {
+	vec3 order0;
+	vec3 order1;
+	vec3 order2;
+};
+
+view_orders view_orders_of(view_point p, float m_l, float m_v, float depth_scale, float facing, bool through)
+{
+	vec3 tau = vec3(extinction_modified) * (p.thickness * depth_scale);
 	vec3 shape = (through ? slab_single_transmitted(tau, m_l, m_v) : facing * slab_single_reflected(tau, m_l, m_v)) * (0.25 / PI);
 	vec3 p_f = vec3(1.0) - vec3(extinction_modified) / vec3(extinction);
-	vec3 full = phase_full(angle);
-	parts.order2 = sun * phase_twice(angle) * shape * slab_double_scale(thickness, through);
-	parts.multiple = sun * (mu_l / PI) * slab_multiple(thickness, through);
+	vec3 full = phase_full(p.half_angle);
+	view_orders orders;
+	orders.order2 = phase_twice(p.half_angle) * shape * slab_double_scale(p.thickness, through);
 #if VIEW_ABOVE
 	// The forward peak does not turn back.
-	parts.order1 = sun * full / (vec3(1.0) - p_f) * shape;
+	orders.order0 = vec3(0.0);
+	orders.order1 = full / (vec3(1.0) - p_f) * shape;
 #else
-	float depth = through ? extinction.y * thickness * 0.5 * (1.0 / m_l + 1.0 / m_v) : 0.0;
+	float depth = through ? extinction.y * p.thickness * 0.5 * (1.0 / m_l + 1.0 / m_v) : 0.0;
 	// One event and no forward ones beside it: order 0 inside the forward peak, order 1 outside.
 	vec3 sharp = full * exp(-p_f * depth) / (vec3(1.0) - p_f) * shape;
-	bool inside = angle.x < FORWARD_PEAK_SINE;
-	parts.order0 = sun * ((inside ? sharp : vec3(0.0)) + forward_peak(angle, depth));
-	parts.order1 = sun * ((inside ? vec3(0.0) : sharp) + forward_blur(angle, depth) * shape);
+	bool inside = p.half_angle.x < FORWARD_PEAK_SINE;
+	orders.order0 = (inside ? sharp : vec3(0.0)) + forward_peak(p.half_angle, depth);
+	orders.order1 = (inside ? vec3(0.0) : sharp) + forward_blur(p.half_angle, depth) * shape;
+#endif
+	return orders;
+}
+
+// Light of the sun, of irradiance `sun` normal to its beam, that one lit side of the layer, base or top, sends to the viewer.
+void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
+{
+	bool through = base == (VIEW_ABOVE > 0);
+	float mu_l = view_lit_cosine(base ? -p.mu_sun : p.mu_sun);
+	float m_l = max(mu_l, 0.01);
+	float m_v = p.mu_v;
+	float depth_scale = 1.0;
+	float facing = 1.0;
+#if VIEW_ABOVE
+	if (!through) {
+		// A facet turned away from light or view is faded out instead of cut.
+		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * smoothstep(-0.05, 0.10, p.mu_v_facet);
+		m_l = max(p.mu_l_facet, 0.03);
+		m_v = max(p.mu_v_facet, 0.03);
+		depth_scale = p.depth_facet;
+	}
+#endif
+	sun *= mu_l / max(mu_l, 0.01);
+#if VIEW_SOLVED
+	vec3 first = facing * sun * solved_first(p.half_angle, vec3(extinction_scaled) * (p.thickness * depth_scale), m_l, m_v, through);
+	vec3 rest = sun * solved_multiple(base ? slab_light.x : 0.0, p.smooth_thickness, vec3(extinction_scaled) * p.thickness, max(mu_l, 0.01), p.mu_v,
+	                                  p.view_index, p.cos_azimuth);
+#if VIEW_COLOR_ONLY
+	parts.order1 += first;
+	parts.multiple += rest;
+#else
+	// The sum is the solver's. In layers the orders 0 to 2 are those of the modified phase function and 3+ is what they leave of the solver's
+	// orders; what these four miss or exceed the sum by, a few percent, is shared out.
+	view_orders orders = view_orders_of(p, m_l, m_v, depth_scale, facing, through);
+	vec3 many = rest * max(1.0 - sun.y * orders.order2.y / max(rest.y, 1e-20), 0.0);
+	vec3 share = (first + rest) / max(sun * (orders.order0 + orders.order1 + orders.order2) + many, vec3(1e-20));
+	parts.order0 += sun * orders.order0 * share;
+	parts.order1 += sun * orders.order1 * share;
+	parts.order2 += sun * orders.order2 * share;
+	parts.multiple += many * share;
+#endif
+#else
+	view_orders orders = view_orders_of(p, m_l, m_v, depth_scale, facing, through);
+	parts.order0 += sun * orders.order0;
+	parts.order1 += sun * orders.order1;
+	parts.order2 += sun * orders.order2;
+	parts.multiple += sun * (max(mu_l, 0.01) / PI) * slab_multiple(p.thickness, through);
 #endif
 }
+
+// All light of the sun from the layer. Loops of one round or none, which software renderers really leave out, unlike branches: most scenes light
+// one side.
+void view_layer_sunlight(view_point p, vec3 sun, INOUT(view_parts) parts)
+{
+	for (float lit = 0.0; lit < slab_light.x; lit += 1.0)
+		view_layer_side(p, false, sun, parts);
+	for (float lit = 0.0; lit < slab_light.y; lit += 1.0)
+		view_layer_side(p, true, sun, parts);
+}
+
+// Diffuse light of sky and ground by way of the layer, which they reach with irradiances `sky` and `ground`; and how much of what lies behind
+// is seen through it.
+void view_layer_diffuse(view_point p, vec3 sky, vec3 ground, INOUT(view_parts) parts)
+{
+	parts.transmittance = exp(-vec3(extinction_scaled) * (p.thickness * p.depth_facet / max(p.mu_v_facet, 0.03)));
+	vec3 met = (vec3(1.0) - parts.transmittance) / PI;
+	vec3 share = slab_diffuse_share(p.smooth_thickness, p.view_index);
+#if VIEW_ABOVE
+	parts.cloud_sky = sky * met * (vec3(1.0) - share);
+	parts.cloud_ground = ground * met * share;
+#else
+	parts.cloud_sky = sky * met * share;
+	parts.cloud_ground = ground * met * (vec3(1.0) - share);
+#endif
+	parts.optical_thickness = extinction.y * p.thickness;
+}
+
+view_point view_point_at(vec3 direction, vec2 place, float footprint, float cos_view, float mu_sun)
+{
+	view_point p;
+	p.thickness = view_thickness(place, footprint);
+#if VIEW_SOLVED
+	// The more often light is scattered on its way, the more of it has come from the side.
+	float spread = slab_light.w * p.thickness;
+	p.smooth_thickness = mix(p.thickness, height_smooth(place, max(footprint, slab_light.z)), spread / (1.0 + spread));
+#else
+	p.smooth_thickness = p.thickness;
+#endif
+	p.mu_v = max(abs(cos_view), 0.01);
+	p.view_index = slab_view_index(p.mu_v);
+	p.mu_sun = mu_sun;
+	p.cos_azimuth = view_cos_azimuth(direction, cos_view, mu_sun);
+	p.half_angle = scattering_half_angle(-vec3(sun_direction), -direction);
+	p.depth_facet = 1.0;
+	p.mu_l_facet = abs(mu_sun);
+	p.mu_v_facet = p.mu_v;
+	return p;
+}
+#endif
 
 view_parts view_nothing()
 {
@@ -137,26 +276,18 @@ view_parts view_from_below(vec3 direction, vec2 air)
 	float base = cloud_layer.x;
 	float t = sphere_distance_up(camera_position.z, direction.z, base);
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
-	float mu_v = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
-	float mu_sun = view_sun_cosine(direction, t, base);
-	float footprint = camera_position.w * t * inversesqrt(mu_v);
-	float thickness = field_thickness(place, footprint);
+	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
+	view_point p = view_point_at(direction, place, camera_position.w * t * inversesqrt(cos_view), cos_view, view_sun_cosine(direction, t, base));
 
-	float mu_l = max(abs(mu_sun), 0.03);
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
-	vec3 sun = vec3(textureLod(air_to_end, air, 0.0)) * float(thickness > 0.01);
-	view_layer_sunlight(direction, mu_sun > 0.0, thickness, 1.0, mu_l, mu_l, mu_v, sun, parts);
-	parts.transmittance = exp(-vec3(extinction_modified) * (thickness / mu_v));
-	float plane = slab_plane_transmittance(thickness, mu_v);
-	parts.cloud_sky = to_layer * vec3(sky_irradiance_cloud) / PI * max(vec3(plane) - parts.transmittance, vec3(0.0));
-	parts.cloud_ground = to_layer * vec3(textureLod(cloud_received, place / cloud_layer.z, 0.0)) * ((1.0 - plane) / PI);
+	view_layer_sunlight(p, vec3(textureLod(air_to_end, air, 0.0)) * float(p.thickness > 0.01), parts);
+	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud), to_layer * vec3(textureLod(cloud_received, place / cloud_layer.z, 0.0)), parts);
 
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
-	parts.sun_direct = view_sun_disc(direction) * exp(-vec3(extinction) * (thickness / mu_v));
+	parts.sun_direct = view_sun_disc(direction) * exp(-vec3(extinction) * (p.thickness / p.mu_v));
 	parts.sky = max(vec3(textureLod(sky_total, air, 0.0)) - near, vec3(0.0)) * parts.transmittance;
 	parts.air = near * vec3(air_below) + (vec3(1.0) - to_layer) * vec3(air_around);
-	parts.optical_thickness = extinction.y * thickness;
-	parts.distance = thickness > 0.01 ? t : 0.0;
+	parts.distance = p.thickness > 0.01 ? t : 0.0;
 	return parts;
 }
 #endif
@@ -181,21 +312,16 @@ void view_cloud_top(vec3 direction, float t, vec2 air, INOUT(view_parts) parts)
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float footprint = camera_position.w * t;
 	float mu_sun = view_sun_cosine(direction, t, height);
-	float mu_v = max(-sphere_cosine(camera_position.z, direction.z, t, height), 0.01);
+	float cos_view = min(sphere_cosine(camera_position.z, direction.z, t, height), -0.01);
+	view_point p = view_point_at(direction, place, footprint, cos_view, mu_sun);
 	vec3 normal = height_normal(place, footprint);
-	float thickness = field_thickness(place, footprint);
-	float mu_l = max(mu_sun, 0.03);
-	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
-	vec3 sun = to_layer * sun_irradiance(height, mu_sun) * smoothstep(-0.02, 0.02, mu_sun);
 	// The vertical turns with the distance: facets are taken against the local one.
-	float mu_l_facet = dot(normal, vec3(sun_direction)) + (mu_sun - sun_direction.z) * normal.z;
-	float mu_v_facet = -dot(normal, direction) + (mu_v + direction.z) * normal.z;
-	view_layer_sunlight(direction, false, thickness, normal.z, mu_l, mu_l_facet, mu_v_facet, sun, parts);
-	parts.transmittance = exp(-vec3(extinction_modified) * (thickness * normal.z / max(mu_v_facet, 0.03)));
-	float plane = slab_plane_transmittance(thickness, mu_v);
-	parts.cloud_sky = to_layer * vec3(sky_irradiance_cloud) * ((1.0 - plane) / PI);
-	parts.cloud_ground = to_layer * vec3(textureLod(cloud_received, place / cloud_layer.z, 0.0)) / PI * max(vec3(plane) - parts.transmittance, vec3(0.0));
-	parts.optical_thickness = extinction.y * thickness;
+	p.depth_facet = normal.z;
+	p.mu_l_facet = dot(normal, vec3(sun_direction)) + (mu_sun - sun_direction.z) * normal.z;
+	p.mu_v_facet = -dot(normal, direction) + (p.mu_v + direction.z) * normal.z;
+	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
+	view_layer_sunlight(p, to_layer * sun_irradiance(height, mu_sun), parts);
+	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud), to_layer * vec3(textureLod(cloud_received, place / cloud_layer.z, 0.0)), parts);
 	parts.distance = t;
 }
 #endif
@@ -236,7 +362,7 @@ void view_add_sky(vec3 direction, vec2 air, INOUT(view_parts) parts)
 #endif
 
 // The whole picture. Decided when the shader is built, since software renderers execute both sides of every branch:
-// VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
+// VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_SOLVED: shading; VIEW_COLOR_ONLY: parts are not asked for; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
 view_parts view_ray(vec3 direction)
 {
 	vec2 air = sky_table_coordinates(direction);

@@ -1,4 +1,4 @@
-// The view stage: parts of the picture, chosen by `arguments`: for output i the layer arguments[i / 4][i % 4] (enum layer).
+// The view stage: the color, or parts of the picture, chosen by `arguments`: for output i the layer arguments[i / 4][i % 4] (enum layer).
 #include "shaders/lib/view.glsl"
 #include "shaders/lib/colour.glsl"
 
@@ -25,8 +25,10 @@ vec3 view_layer(view_parts p, int layer)
 void pass(ivec2 pixel)
 {
 	view_parts parts = view_ray(camera_ray(vec2(pixel) + 0.5));
+#if VIEW_COLOR_ONLY
+	STORE(0, vec4(colour_of_bands(view_sum(parts)), 1.0));
+#else
 	STORE(0, vec4(view_layer(parts, int(arguments[0].x)), 1.0));
-#if OUTPUTS > 1
 	STORE(1, vec4(view_layer(parts, int(arguments[0].y)), 1.0));
 	STORE(2, vec4(view_layer(parts, int(arguments[0].z)), 1.0));
 	STORE(3, vec4(view_layer(parts, int(arguments[0].w)), 1.0));

@@ -170,7 +170,7 @@ def test_every_bad_member_at_once(daemon):
     answer = daemon.render(
         '{"sun": {"elevation_deg": 91, "azimuth_deg": "north"}, "moon": {}, "dsd": {"gamma": 1e999, "n0_per_cm3": 1, "n0_per_cm3": 2},'
         '"clouds": {"type": "altocumulus", "wind_mps": [1, 2, 3]}, "camera": {"position_m": [0, 0, 1e5]},'
-        '"ground": {"albedo": [1, 1, 1]}, "model": {"shading": "solved"}, "output": {"layers": ["sky"], "x/y": 0}}'
+        '"ground": {"albedo": [1, 1, 1]}, "model": {"shading": "toon"}, "output": {"layers": ["sky"], "x/y": 0}}'
     )
     assert_problem(answer, 422, "invalid-scene")
     assert answer.pointers == {
@@ -220,7 +220,6 @@ def test_rules_across_members(daemon, scene, pointer):
         ("camera", "projection", ["fisheye", "equirectangular", "cubemap"]),
         ("camera", "face", ["+X"]),
         ("model", "name", ["reference", "volume", "planar"]),
-        ("model", "shading", ["solved"]),
     ],
 )
 def test_later_members_say_so(daemon, section, member, values):

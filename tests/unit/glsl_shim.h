@@ -61,6 +61,12 @@ inline float acos(float x)
 	return std::acos(x);
 }
 
+inline float asin(float x)
+{
+	assert(x >= -1 && x <= 1);
+	return std::asin(x);
+}
+
 /* glm has no smoothstep of floats that asserts its edges in order. */
 inline float smoothstep(float low, float high, float x)
 {
@@ -120,9 +126,34 @@ inline vec4 texelFetch(const sampler2D &sampler, ivec2 at, int level)
 	return from.texels[(size_t)at.y * (size_t)from.width + (size_t)at.x];
 }
 
+/* One level in three dimensions, filtered linearly and clamped. */
+struct volume {
+	int width, height, depth;
+	std::vector<vec4> texels;
+};
+
+using sampler3D = std::shared_ptr<const volume>;
+
+inline vec4 textureLod(const sampler3D &sampler, vec3 at, float)
+{
+	assert(sampler && std::isfinite(at.x) && std::isfinite(at.y) && std::isfinite(at.z));
+	const ivec3 size(sampler->width, sampler->height, sampler->depth);
+	const vec3 p = at * vec3(size) - 0.5f, base = glm::floor(p), f = p - base;
+	vec4 sum(0.0f);
+	for (int corner = 0; corner < 8; corner++) {
+		const ivec3 offset(corner & 1, corner >> 1 & 1, corner >> 2);
+		const ivec3 texel = glm::clamp(ivec3(base) + offset, ivec3(0), size - 1);
+		const vec3 weight = glm::mix(1.0f - f, f, vec3(offset));
+		sum += weight.x * weight.y * weight.z *
+		       sampler->texels[((size_t)texel.z * (size_t)size.y + (size_t)texel.y) * (size_t)size.x + (size_t)texel.x];
+	}
+	return sum;
+}
+
 /* Samplers of the library. */
 static sampler2D field_coarse, field_detail, ground_map, ground_relief, height_table, height_maximum;
-static sampler2D phase_table, forward_peak_table, forward_blur_table, slab_sun_table, slab_view_table;
+static sampler2D probes, phase_table, event_table, slab_table;
+static sampler3D slab_slices;
 static sampler2D transmittance_table, multiscatter_table, sky_total, sky_near, air_to_layer, air_to_end;
 static sampler2D ground_received, cloud_received;
 
@@ -154,6 +185,9 @@ static vec4 arguments[4], stored[8];
 	X(cloud_threshold)                                                                                                                 \
 	X(extinction)                                                                                                                      \
 	X(extinction_modified)                                                                                                             \
+	X(extinction_scaled)                                                                                                               \
+	X(slab_slice_range)                                                                                                                \
+	X(slab_light)                                                                                                                      \
 	X(sky_irradiance_cloud)                                                                                                            \
 	X(sky_irradiance_ground)                                                                                                           \
 	X(air_below)                                                                                                                       \

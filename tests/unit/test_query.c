@@ -91,7 +91,7 @@ static void test_refusals(void **state)
 	assert_refused("camera.position_m=0,0,x", "/camera/position_m/2");
 	assert_refused("output.layers=", "/output/layers/0");
 	assert_refused("clouds.seed=1.5", "/clouds/seed");
-	assert_refused("model.shading=solved", "/model/shading");
+	assert_refused("model.shading=toon", "/model/shading");
 }
 
 static void test_too_many(void **state)

@@ -155,7 +155,7 @@ static void test_default_form(void **state)
 		"\"atmosphere\":{\"aerosol_optical_depth\":0.1,\"ozone_du\":300},\"camera\":{\"position_m\":[0,0,2],\"azimuth_deg\":140,"
 		"\"elevation_deg\":20,\"roll_deg\":0,\"vertical_fov_deg\":60,\"projection\":\"perspective\"},\"radiosity\":{\"enabled\":"
 		"true,"
-		"\"tolerance\":0.001,\"max_passes\":64},\"model\":{\"name\":\"slab\",\"shading\":\"paper\",\"optics\":\"mie\"},"
+		"\"tolerance\":0.001,\"max_passes\":64},\"model\":{\"name\":\"slab\",\"shading\":\"solved\",\"optics\":\"mie\"},"
 		"\"output\":{\"width\":1024,\"height\":768,\"format\":\"png\",\"exposure_ev\":\"auto\",\"tone\":\"filmic\",\"layers\":["
 		"\"color\"],"
 		"\"exr_compression\":\"zip\",\"exr_type\":\"auto\",\"png_compression\":\"fast\",\"bits\":8}}");

@@ -182,7 +182,6 @@ static void test_later(void **state)
 	assert_later("{\"camera\":{\"projection\":\"cubemap\",\"face\":\"+X\"}}", "/camera/face");
 	assert_later("{\"camera\":{\"projection\":\"equirectangular\"}}", "/camera/projection");
 	assert_later("{\"model\":{\"name\":\"volume\"}}", "/model/name");
-	assert_later("{\"model\":{\"shading\":\"solved\"}}", "/model/shading");
 	read("{\"camera\":{\"projection\":\"fisheye\",\"roll_deg\":0}}");
 	assert_true(problem_mentions(&problem, "/camera/roll_deg"));
 	read("{\"clouds\":{\"map\":\"a\",\"seed\":3}}");

@@ -1,7 +1,7 @@
 /* The GLSL library compiled for the processor: slab, phase table, colour and noise, against independent values. */
 extern "C" {
 #include "renderer/stages/colour.h"
-#include "renderer/stages/droplets.h"
+#include "renderer/stages/slab_tables.h"
 }
 #include "tests/unit/glsl_shim.h"
 
@@ -18,7 +18,7 @@ namespace glsl
 namespace cloud
 {
 #include "shaders/lib/colour.glsl"
-#include "shaders/lib/slab.glsl"
+#include "shaders/lib/slab_solved.glsl"
 } // namespace cloud
 } // namespace glsl
 
@@ -147,10 +147,20 @@ static void phase_columns_round_trip(void **)
 		assert_near(half.y, std::cos(angle / 2), 2e-6);
 		assert_near(phase_unit(half), unit, 3e-6);
 	}
-	assert_near(glsl::cloud::PHASE_TABLE_WIDTH, ::PHASE_TABLE_WIDTH, 0);
-	assert_near(glsl::cloud::SLAB_SUN_WIDTH, ::SLAB_SUN_WIDTH, 0);
-	assert_near(glsl::cloud::SLAB_SUN_ROWS, ::SLAB_SUN_ROWS, 0);
-	assert_near(glsl::cloud::SLAB_VIEW_SIZE, ::SLAB_VIEW_SIZE, 0);
+	assert_near(PHASE_TABLE_WIDTH, DROPLET_PHASE_COLUMNS, 0);
+	assert_near(EVENT_TABLE_SIZE.x, EVENT_TABLE_WIDTH, 0);
+	assert_near(EVENT_TABLE_SIZE.y, 4 * EVENT_TABLE_DEPTHS, 0);
+	assert_near(EVENT_DEPTHS, EVENT_TABLE_DEPTHS, 0);
+	assert_near(FORWARD_PEAK_REACH, FORWARD_ANGLE_MAX, 1e-7);
+	assert_near(FORWARD_PEAK_WIDTH, FORWARD_ANGLE_COUNT, 0);
+	assert_near(FORWARD_BLUR_WIDTH, BLUR_ANGLE_COUNT, 0);
+	assert_near(SLAB_TABLE_SIZE.x, SLAB_TABLE_WIDTH, 0);
+	assert_near(SLAB_TABLE_SIZE.y, SLAB_TABLE_HEIGHT, 0);
+	assert_near(SLAB_VIEWS, SLAB_SLICE_VIEW_COUNT, 0);
+	assert_near(SOLVED_DEPTHS, SLAB_SLICE_DEPTH_COUNT, 0);
+	assert_near(SOLVED_AZIMUTHS, SLAB_SLICE_AZIMUTH_COUNT, 0);
+	assert_near(SOLVED_DEPTH_MIN, SLAB_DEPTH_MIN, 1e-8);
+	assert_near(SOLVED_DEPTH_LAST, slab_depth(SLAB_DEPTH_COUNT - 1), 0.5);
 	assert_near(FORWARD_PEAK_SINE, std::sin(0.5 * (double)FORWARD_PEAK_ANGLE), 1e-7);
 }
 

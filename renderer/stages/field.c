@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { PASS_COARSE, PASS_DETAIL, PASS_HISTOGRAM, PASS_HEIGHT, PASS_MAXIMUM };
+enum { PASS_COARSE, PASS_DETAIL, PASS_HISTOGRAM, PASS_HEIGHT, PASS_MAXIMUM, PASS_SMOOTH };
 
 static const struct pass_desc pass_descs[FIELD_PASS_COUNT] = {
 	[PASS_COARSE] = {.file = "shaders/passes/field_coarse.glsl", .outputs = 1},
@@ -14,10 +14,11 @@ static const struct pass_desc pass_descs[FIELD_PASS_COUNT] = {
 	[PASS_HISTOGRAM] = {.file = "shaders/passes/field_histogram.glsl", .outputs = 0, .samplers = {"field_coarse", "field_detail"}},
 	[PASS_HEIGHT] = {.file = "shaders/passes/height_base.glsl", .outputs = 1, .samplers = {"field_coarse", "field_detail"}},
 	[PASS_MAXIMUM] = {.file = "shaders/passes/height_maximum.glsl", .outputs = 1, .samplers = {"height_below"}},
+	[PASS_SMOOTH] = {.file = "shaders/passes/height_smooth.glsl", .outputs = 1, .samplers = {"thickness"}},
 };
 
-/* HEIGHT_SIDE and HEIGHT_SIDE_BELOW as in shaders/lib/height.glsl, DETAIL_SIDE as in shaders/lib/field.glsl. */
-enum { DETAIL_SIDE = 512, HEIGHT_SIDE = 1024, HEIGHT_SIDE_BELOW = 256, HISTOGRAM_BINS = 4096 };
+/* HEIGHT_SIDE and SMOOTH_SIDE as in shaders/lib/height.glsl, DETAIL_SIDE as in shaders/lib/field.glsl. */
+enum { DETAIL_SIDE = 512, HEIGHT_SIDE = 1024, SMOOTH_SIDE = 256, HISTOGRAM_BINS = 4096 };
 
 /* Densities are sums of noise within -3..3 and cells within 0..1, with weights below 1: nothing lies outside. */
 static const double density_lowest = -5, density_highest = 6;
@@ -225,54 +226,111 @@ static void maximum_level(const struct field_stage *stage, struct height_field *
 		texture_finish(&below);
 }
 
-static bool maximum_compute(const struct field_stage *stage, struct height_field *field)
+/* The thickness over the tile, `side` texels a side, with its means. */
+static bool height_compute(const struct field_stage *stage, const struct coarse_field *coarse, int side, struct texture *height)
 {
-	if (!texture_init(&field->maximum, HEIGHT_SIDE / 2, HEIGHT_SIDE / 2, TEXTURE_R32F,
-			  TEXTURE_REPEAT | TEXTURE_NEAREST | TEXTURE_MIPMAPS))
+	if (!texture_init(height, side, side, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS))
 		return false;
-	for (int level = 0; level < field->maximum.levels; level++)
-		maximum_level(stage, field, level);
+	pass_run(stage->passes[PASS_HEIGHT], &(struct pass_run){.targets = (struct texture *[]){height},
+								.samplers = {&coarse->coarse, &coarse->detail},
+								.arguments = {{(float)side}}});
+	texture_build_mipmaps(height);
 	return true;
 }
 
-static struct height_field *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse, bool from_above)
+static struct height_field *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse)
 {
-	const int side = from_above ? HEIGHT_SIDE : HEIGHT_SIDE_BELOW;
 	struct height_field *field = calloc(1, sizeof *field);
 	if (!field)
 		return NULL;
-	if (!texture_init(&field->height, side, side, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
+	if (!height_compute(stage, coarse, HEIGHT_SIDE, &field->height) ||
+	    !texture_init(&field->maximum, HEIGHT_SIDE / 2, HEIGHT_SIDE / 2, TEXTURE_R32F,
+			  TEXTURE_REPEAT | TEXTURE_NEAREST | TEXTURE_MIPMAPS)) {
 		height_field_destroy(field);
 		return NULL;
 	}
-	pass_run(stage->passes[PASS_HEIGHT], &(struct pass_run){.targets = (struct texture *[]){&field->height},
-								.samplers = {&coarse->coarse, &coarse->detail},
-								.arguments = {{(float)side}}});
-	texture_build_mipmaps(&field->height);
-	if (from_above && !maximum_compute(stage, field)) {
-		height_field_destroy(field);
-		return NULL;
-	}
+	for (int level = 0; level < field->maximum.levels; level++)
+		maximum_level(stage, field, level);
 	return field;
 }
 
-static const struct height_field *height_field_get(const struct field_stage *stage, struct stage_context *context,
-						   const struct scene *scene, const struct coarse_field *coarse, bool from_above)
+static struct cache_key thickness_key(const char *name, const struct scene_clouds *clouds)
 {
-	struct cache_key key = cache_key_make("height");
-	add_field_inputs(&key, &scene->clouds);
-	cache_key_add(&key, scene->clouds.coverage);
-	cache_key_add(&key, scene->clouds.thickness_m);
-	cache_key_add(&key, from_above);
+	struct cache_key key = cache_key_make(name);
+	add_field_inputs(&key, clouds);
+	cache_key_add(&key, clouds->coverage);
+	cache_key_add(&key, clouds->thickness_m);
+	return key;
+}
+
+static const struct height_field *height_field_get(const struct field_stage *stage, struct stage_context *context,
+						   const struct scene *scene, const struct coarse_field *coarse)
+{
+	const struct cache_key key = thickness_key("height", &scene->clouds);
 	struct height_field *field = cache_find(context->cache, &key);
 	if (field)
 		return field;
 	context->reused = false;
-	field = height_field_compute(stage, coarse, from_above);
+	field = height_field_compute(stage, coarse);
 	if (!field ||
 	    !cache_keep(context->cache, &key, field, texture_bytes(&field->height) + texture_bytes(&field->maximum), height_field_destroy))
 		return NULL;
 	return field;
+}
+
+static void texture_destroy(void *value)
+{
+	struct texture *texture = value;
+	if (texture)
+		texture_finish(texture);
+	free(texture);
+}
+
+static struct texture *smooth_compute(const struct field_stage *stage, const struct coarse_field *coarse, double length_m)
+{
+	struct texture height = {0}, *smooth = calloc(1, sizeof *smooth);
+	if (!smooth || !height_compute(stage, coarse, SMOOTH_SIDE, &height) ||
+	    !texture_init(smooth, SMOOTH_SIDE, SMOOTH_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
+		texture_finish(&height);
+		free(smooth);
+		return NULL;
+	}
+	pass_run(stage->passes[PASS_SMOOTH], &(struct pass_run){.targets = (struct texture *[]){smooth},
+								.samplers = {&height},
+								.arguments = {{SMOOTH_SIDE, (float)length_m}}});
+	texture_build_mipmaps(smooth);
+	texture_finish(&height);
+	return smooth;
+}
+
+static const struct texture *smooth_get(const struct field_stage *stage, struct stage_context *context, const struct scene *scene,
+					const struct coarse_field *coarse)
+{
+	const double length = context->block.slab_light[2];
+	struct cache_key key = thickness_key("smooth", &scene->clouds);
+	cache_key_add(&key, length);
+	struct texture *smooth = cache_find(context->cache, &key);
+	if (smooth)
+		return smooth;
+	context->reused = false;
+	smooth = smooth_compute(stage, coarse, length);
+	if (!smooth || !cache_keep(context->cache, &key, smooth, texture_bytes(smooth), texture_destroy))
+		return NULL;
+	return smooth;
+}
+
+static bool thickness_get(const struct field_stage *stage, struct stage_context *context, const struct scene *scene,
+			  const struct coarse_field *coarse, bool from_above, struct field_maps *maps)
+{
+	maps->smooth = smooth_get(stage, context, scene, coarse);
+	if (!maps->smooth || !from_above)
+		return maps->smooth;
+	const struct height_field *height = height_field_get(stage, context, scene, coarse);
+	if (!height)
+		return false;
+	maps->height = &height->height;
+	maps->maximum = &height->maximum;
+	return true;
 }
 
 bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, bool from_above,
@@ -295,12 +353,9 @@ bool field_stage_run(const struct field_stage *stage, struct stage_context *cont
 	stage_upload_block(context);
 	maps->coarse = &coarse->coarse;
 	maps->detail = &coarse->detail;
-	const struct height_field *height = height_field_get(stage, context, scene, coarse, from_above);
-	if (!height) {
+	if (!thickness_get(stage, context, scene, coarse, from_above, maps)) {
 		log_error("field: out of memory");
 		return false;
 	}
-	maps->height = &height->height;
-	maps->maximum = from_above ? &height->maximum : NULL;
 	return true;
 }

@@ -10,7 +10,7 @@
 
 /* OpenGL grants 16 samplers; each side leaves some out. */
 #define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "ground_relief"
-#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received", "height_table"
+#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received", "smooth_table"
 
 static const struct {
 	const char *defines;
@@ -18,42 +18,39 @@ static const struct {
 } sides[VIEW_SIDES] = {
 	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
 	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS, CLOUD_SAMPLERS, "field_coarse", "field_detail"}},
-	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n", {COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_maximum"}},
+	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_table", "height_maximum"}},
 };
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
 
-/* outputs 1: the color alone. */
-static struct pass *create_pass(const struct pass_compiler *compiler, enum shading shading, enum view_side side, enum view_region region,
-				int outputs)
+static struct pass *create_pass(const struct pass_compiler *compiler, const struct view_variant *variant)
 {
 	char defines[256];
+	const int outputs = variant->layers ? VIEW_OUTPUTS : 1;
 	struct pass_desc desc = {.file = "shaders/passes/view.glsl", .defines = defines, .outputs = outputs};
-	snprintf(defines, sizeof defines, "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_COLOR_ONLY %d\n",
-		 sides[side].defines, region, shading == SHADING_SOLVED, outputs == 1);
-	memcpy(desc.samplers, sides[side].samplers, sizeof desc.samplers);
+	snprintf(defines, sizeof defines,
+		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n",
+		 sides[variant->side].defines, variant->region, variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers);
+	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
 	return pass_create(compiler, &desc);
 }
 
-/* A clear sky has no shading; its passes are kept under the first. */
-static enum shading shading_of(const struct scene *scene, enum view_side side)
+/* NULL (and log lines with the driver's message) when it does not compile. */
+static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
-	return side == VIEW_CLEAR ? 0 : scene->model.shading;
-}
-
-static bool create_side(struct view_stage *stage, const struct pass_compiler *compiler, enum shading shading, enum view_side side)
-{
-	for (int region = 0; region < VIEW_REGIONS; region++)
-		if (!(stage->color[shading][side][region] = create_pass(compiler, shading, side, region, 1)))
-			return false;
-	return (stage->layers[shading][side] = create_pass(compiler, shading, side, VIEW_MIXED, VIEW_OUTPUTS)) != NULL;
+	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region];
+	if (!*pass)
+		*pass = create_pass(&stage->compiler, variant);
+	return *pass;
 }
 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
+	stage->compiler = *compiler;
 	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
-	for (int shading = 0; ok && shading < SHADING_COUNT; shading++)
-		for (int side = 0; ok && side < VIEW_SIDES; side++)
-			ok = (side == VIEW_CLEAR && shading > 0) || create_side(stage, compiler, shading, side);
+	for (int side = 0; ok && side < VIEW_SIDES; side++)
+		for (int region = 0; ok && region < VIEW_REGIONS; region++)
+			ok = pass_of(stage, &(struct view_variant){.side = side, .region = region, .shading = SHADING_SOLVED});
 	if (!ok)
 		view_stage_finish(stage);
 	return ok;
@@ -61,12 +58,9 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	for (int shading = 0; shading < SHADING_COUNT; shading++)
-		for (int side = 0; side < VIEW_SIDES; side++) {
-			pass_destroy(stage->layers[shading][side]);
-			for (int region = 0; region < VIEW_REGIONS; region++)
-				pass_destroy(stage->color[shading][side][region]);
-		}
+	struct pass **passes = &stage->passes[0][0][0][0][0];
+	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
+		pass_destroy(passes[i]);
 	pass_destroy(stage->develop);
 	*stage = (struct view_stage){0};
 }
@@ -169,9 +163,9 @@ static void bind_inputs(struct pass_run *run, enum view_side side, const struct 
 					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  in->field->height,
-					  above ? in->field->maximum : in->field->coarse,
-					  above ? NULL : in->field->detail};
+					  in->field->smooth,
+					  above ? in->field->height : in->field->coarse,
+					  above ? in->field->maximum : in->field->detail};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -211,42 +205,64 @@ static enum view_region region_of_row(const struct scene_block *block, enum view
 }
 
 /* Runs over rows of one kind after the other, each with the program made for it. */
-static void run_regions(struct pass *const passes[VIEW_REGIONS], const struct stage_context *context, enum view_side side,
-			struct pass_run *run)
+static bool run_regions(struct view_stage *stage, const struct stage_context *context, struct view_variant variant, struct pass_run *run)
 {
 	const int height = run->targets[0]->height;
 	run->width = run->targets[0]->width;
 	for (int first = 0; first < height;) {
-		const enum view_region region = region_of_row(&context->block, side, first);
+		variant.region = region_of_row(&context->block, variant.side, first);
+		const struct pass *pass = pass_of(stage, &variant);
+		if (!pass)
+			return false;
 		int end = first + 1;
-		while (end < height && region_of_row(&context->block, side, end) == region)
+		while (end < height && region_of_row(&context->block, variant.side, end) == variant.region)
 			end++;
 		run->first_row = first;
 		run->height = end - first;
-		pass_run(passes[region], run);
+		pass_run(pass, run);
 		first = end;
 	}
+	return true;
+}
+
+/* The whole with one program. Pictures that are rare have no programs for their parts. */
+static bool run_whole(struct view_stage *stage, struct view_variant variant, const struct pass_run *run)
+{
+	variant.region = VIEW_MIXED;
+	const struct pass *pass = pass_of(stage, &variant);
+	if (pass)
+		pass_run(pass, run);
+	return pass;
+}
+
+/* A clear sky has neither shading nor a layer to be lit from below. */
+static struct view_variant variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+				      bool layers)
+{
+	const enum view_side side = side_of(scene, inputs);
+	if (side == VIEW_CLEAR)
+		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers};
+	return (struct view_variant){
+		.side = side, .shading = scene->model.shading, .twilight = context->block.slab_light[1] > 0, .layers = layers};
 }
 
 /* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. */
-static bool run_group(const struct view_stage *stage, struct stage_context *context, const struct scene *scene,
-		      const struct view_inputs *inputs, const enum layer *layers, int count, const struct texture **pictures)
+static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		      const enum layer *layers, int count, const struct texture **pictures)
 {
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const enum view_side side = side_of(scene, inputs);
-	const enum shading shading = shading_of(scene, side);
-	bind_inputs(&run, side, inputs);
+	const struct view_variant variant = variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR);
+	bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
 		targets[i] = picture_create(scene);
 		if (!targets[i])
 			goto fail;
 	}
-	if (count == 1 && layers[0] == LAYER_COLOR)
-		run_regions(stage->color[shading][side], context, side, &run);
-	else
-		pass_run(stage->layers[shading][side], &run);
+	const bool whole = variant.layers || variant.twilight;
+	if (!(whole ? run_whole(stage, variant, &run) : run_regions(stage, context, variant, &run)))
+		goto fail;
 	for (int i = 0; i < count; i++) {
 		const struct cache_key key = make_key(scene, layers[i]);
 		struct texture *picture = targets[i];
@@ -264,9 +280,9 @@ fail:
 	return false;
 }
 
-bool view_stage_run(const struct view_stage *stage, struct stage_context *context, const struct scene *scene,
-		    const struct view_inputs *inputs, const enum layer *layers, int count, renderer_cancelled *cancelled,
-		    void *cancel_context, const struct texture **pictures)
+bool view_stage_run(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		    const enum layer *layers, int count, renderer_cancelled *cancelled, void *cancel_context,
+		    const struct texture **pictures)
 {
 	enum layer missing[LAYER_COUNT];
 	int place[LAYER_COUNT], missing_count = 0;

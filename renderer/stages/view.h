@@ -7,7 +7,7 @@
 
 #include "renderer/stages/radiosity.h"
 
-/* The view pass exists for the color alone, for each part of the picture, and with several layers for the whole. */
+/* Layers that one run of the view pass makes. */
 enum { VIEW_OUTPUTS = 4 };
 
 /* Where the camera is. */
@@ -16,9 +16,20 @@ enum view_side { VIEW_CLEAR, VIEW_BELOW, VIEW_ABOVE, VIEW_SIDES };
 /* Rows of the picture: rays of either kind, all to the ground, none to the ground. The numbers stand in shaders/lib/view.glsl. */
 enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 
+/* The view pass exists in many forms, since software renderers execute both sides of every branch. */
+struct view_variant {
+	enum view_side side;
+	enum view_region region;
+	enum shading shading;
+	bool twilight; /* the base of the layer is lit by the sun somewhere */
+	bool layers;   /* several, else the color alone */
+};
+
 struct view_stage {
-	struct pass *color[SHADING_COUNT][VIEW_SIDES][VIEW_REGIONS];
-	struct pass *layers[SHADING_COUNT][VIEW_SIDES]; /* VIEW_OUTPUTS outputs */
+	struct pass_compiler compiler; /* shader_dir must outlive the stage */
+	/* By shading, side, twilight, layers, region. Those that most pictures need are made at the start, the others with the first
+	 * picture that wants them. */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS];
 	struct pass *develop;
 };
 
@@ -38,10 +49,10 @@ void view_stage_finish(struct view_stage *stage);
 void view_fill_block(struct scene_block *block, const struct scene *scene);
 
 /* Renders layers[0..count) into textures of the output's size (RGBA32F), owned by the cache and valid for this frame. cancelled may be
- * NULL; it is asked between passes. false when cancelled or out of memory. */
-bool view_stage_run(const struct view_stage *stage, struct stage_context *context, const struct scene *scene,
-		    const struct view_inputs *inputs, const enum layer *layers, int count, renderer_cancelled *cancelled,
-		    void *cancel_context, const struct texture **pictures);
+ * NULL; it is asked between passes. false when cancelled, out of memory, or when a program does not compile. */
+bool view_stage_run(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		    const enum layer *layers, int count, renderer_cancelled *cancelled, void *cancel_context,
+		    const struct texture **pictures);
 
 /* Exposure, tone and sRGB of a picture into `target` (RGBA8 or RGBA16). Reads the block's develop member. */
 void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target);

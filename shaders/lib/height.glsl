@@ -1,19 +1,19 @@
-// The thickness as a picture over the tile. Its levels are means, which light that is scattered often sees. For views from above it is a height field over
-// the flat base, met by a ray through a pyramid of maxima (Tevs, Ihrke and Seidel 2008, "Maximum Mipmaps for Fast, Accurate, and Scalable Dynamic Height Field
+// The thickness as a picture over the tile: evened out, as light that is scattered often sees it; and for views from above as a height field over the flat
+// base, met by a ray through a pyramid of maxima (Tevs, Ihrke and Seidel 2008, "Maximum Mipmaps for Fast, Accurate, and Scalable Dynamic Height Field
 // Rendering").
 #ifndef SHADERS_LIB_HEIGHT
 #define SHADERS_LIB_HEIGHT
-#include "shaders/lib/bicubic.glsl"
 #include "shaders/lib/sphere.glsl"
 
 #ifndef __cplusplus
 uniform sampler2D height_table;
 uniform sampler2D height_maximum;
+uniform sampler2D smooth_table;
 #endif
 
-// Texels a side, for views from above and from below.
+// Texels a side.
 const float HEIGHT_SIZE = 1024.0;
-const float HEIGHT_SIZE_BELOW = 256.0;
+const float HEIGHT_SIZE_SMOOTH = 256.0;
 const int HEIGHT_ITERATIONS = 160;
 
 // Height of the top above the base at a place, m, seen at a footprint.
@@ -23,21 +23,11 @@ float height_at(vec2 place, float footprint)
 	return textureLod(height_table, (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z, lod).x;
 }
 
-// Mean thickness over about `length` m around a place.
-float height_smooth(vec2 place, float length)
+// Thickness evened out over the way that light goes sideways, m.
+float height_smooth(vec2 place, float footprint)
 {
-#if VIEW_ABOVE
-	float side = HEIGHT_SIZE;
-#else
-	float side = HEIGHT_SIZE_BELOW;
-#endif
-	// The spline itself evens out over 1.4 texels (its standard deviation is that of a box of two).
-	float lod = max(0.0, log2(length * side / cloud_layer.z) - 0.5);
-	float coarse = floor(lod);
-	bicubic_samples s = bicubic_at((place - vec2(cloud_drift)) / cloud_layer.z, side * exp2(-coarse));
-	float a = mix(textureLod(height_table, vec2(s.far.x, s.near.y), lod).x, textureLod(height_table, s.near, lod).x, s.share.x);
-	float b = mix(textureLod(height_table, s.far, lod).x, textureLod(height_table, vec2(s.near.x, s.far.y), lod).x, s.share.x);
-	return mix(b, a, s.share.y);
+	float lod = max(0.0, log2(footprint * HEIGHT_SIZE_SMOOTH / cloud_layer.z));
+	return textureLod(smooth_table, (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z, lod).x;
 }
 
 // Distance along the ray to the cloud top, or -1. from..to: where the ray lies between the highest top and the base.

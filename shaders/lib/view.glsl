@@ -189,14 +189,13 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 #endif
 }
 
-// All light of the sun from the layer. Loops of one round or none, which software renderers really leave out, unlike branches: most scenes light
-// one side.
+// All light of the sun from the layer.
 void view_layer_sunlight(view_point p, vec3 sun, INOUT(view_parts) parts)
 {
-	for (float lit = 0.0; lit < slab_light.x; lit += 1.0)
-		view_layer_side(p, false, sun, parts);
-	for (float lit = 0.0; lit < slab_light.y; lit += 1.0)
-		view_layer_side(p, true, sun, parts);
+	view_layer_side(p, false, sun, parts);
+#if VIEW_TWILIGHT
+	view_layer_side(p, true, sun, parts);
+#endif
 }
 
 // Diffuse light of sky and ground by way of the layer, which they reach with irradiances `sky` and `ground`; and how much of what lies behind
@@ -223,7 +222,7 @@ view_point view_point_at(vec3 direction, vec2 place, float footprint, float cos_
 #if VIEW_SOLVED
 	// The more often light is scattered on its way, the more of it has come from the side.
 	float spread = slab_light.w * p.thickness;
-	p.smooth_thickness = mix(p.thickness, height_smooth(place, max(footprint, slab_light.z)), spread / (1.0 + spread));
+	p.smooth_thickness = mix(p.thickness, height_smooth(place, footprint), spread / (1.0 + spread));
 #else
 	p.smooth_thickness = p.thickness;
 #endif
@@ -362,7 +361,7 @@ void view_add_sky(vec3 direction, vec2 air, INOUT(view_parts) parts)
 #endif
 
 // The whole picture. Decided when the shader is built, since software renderers execute both sides of every branch:
-// VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_SOLVED: shading; VIEW_COLOR_ONLY: parts are not asked for; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
+// VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_SOLVED: shading; VIEW_TWILIGHT: the sun lights the base somewhere; VIEW_COLOR_ONLY: parts are not asked for; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
 view_parts view_ray(vec3 direction)
 {
 	vec2 air = sky_table_coordinates(direction);

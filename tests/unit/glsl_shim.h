@@ -151,7 +151,7 @@ inline vec4 textureLod(const sampler3D &sampler, vec3 at, float)
 }
 
 /* Samplers of the library. */
-static sampler2D field_coarse, field_detail, ground_map, ground_relief, height_table, height_maximum;
+static sampler2D field_coarse, field_detail, ground_map, ground_relief, height_table, height_maximum, smooth_table;
 static sampler2D probes, phase_table, event_table, slab_table;
 static sampler3D slab_slices;
 static sampler2D transmittance_table, multiscatter_table, sky_total, sky_near, air_to_layer, air_to_end;

@@ -19,8 +19,9 @@ extern "C" {
 #include <cmocka.h>
 }
 
-enum { VARIANTS = 5 };
-static const char *const variant_names[VARIANTS] = {"clear", "below", "above", "below, paper", "above, paper"};
+enum { VARIANTS = 7 };
+static const char *const variant_names[VARIANTS] = {"clear",        "below",           "above",          "below, paper",
+						    "above, paper", "below, twilight", "above, twilight"};
 
 /* The view pass, once for each side and shading. */
 #define VIEW_REGION     0
@@ -28,6 +29,7 @@ static const char *const variant_names[VARIANTS] = {"clear", "below", "above", "
 #define VIEW_CLOUDS     0
 #define VIEW_ABOVE      0
 #define VIEW_SOLVED     1
+#define VIEW_TWILIGHT   1
 namespace glsl
 {
 namespace clear
@@ -66,8 +68,9 @@ namespace above
 #undef VIEW_ABOVE
 #undef VIEW_CLOUDS
 
-static void (*const cpu_pass[VARIANTS])(glsl::ivec2) = {glsl::clear::pass, glsl::below::pass, glsl::above::pass, glsl::below_paper::pass,
-							glsl::above_paper::pass};
+static void (*const cpu_pass[VARIANTS])(glsl::ivec2) = {glsl::clear::pass,       glsl::below::pass,       glsl::above::pass,
+							glsl::below_paper::pass, glsl::above_paper::pass, glsl::below::pass,
+							glsl::above::pass};
 
 enum { WIDTH = 96, HEIGHT = 72, LAYERS = 5 };
 static const layer layers[LAYERS] = {LAYER_COLOR, LAYER_ORDER1, LAYER_MULTIPLE, LAYER_AIR, LAYER_OPTICAL_THICKNESS};
@@ -125,8 +128,10 @@ static void stop()
 static scene make_scene(int variant)
 {
 	struct scene scene = scene_default();
-	const int side = variant < 3 ? variant : variant - 2;
-	scene.model.shading = variant < 3 ? SHADING_SOLVED : SHADING_PAPER;
+	const int side = variant < 3 ? variant : variant % 2 ? 1 : 2;
+	scene.model.shading = variant == 3 || variant == 4 ? SHADING_PAPER : SHADING_SOLVED;
+	if (variant >= 5)
+		scene.sun.elevation_deg = 0.5;
 	scene.output.width = WIDTH;
 	scene.output.height = HEIGHT;
 	scene.camera.azimuth_deg = 80;
@@ -246,6 +251,7 @@ static void copy_textures(const made &out)
 	glsl::field_detail = copy_of(out.field.detail);
 	glsl::height_table = copy_of(out.field.height);
 	glsl::height_maximum = copy_of(out.field.maximum);
+	glsl::smooth_table = copy_of(out.field.smooth);
 	glsl::phase_table = copy_of(&out.drops->phase);
 	glsl::event_table = copy_of(&out.drops->events);
 	glsl::slab_table = copy_of(out.slab_rows);

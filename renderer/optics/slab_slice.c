@@ -12,8 +12,7 @@ enum { N = SLAB_NODE_COUNT, VIEWS = SLAB_SLICE_VIEW_COUNT, AZIMUTHS = SLAB_SLICE
 /* Factors that all depths share. */
 struct directions {
 	float sun[N];
-	float view[VIEWS][N];     /* of even modes */
-	float view_odd[VIEWS][N]; /* times both sines */
+	float view[2][N][VIEWS]; /* of even modes, and of odd ones: times both sines */
 	float cosine[MODES][AZIMUTHS];
 };
 
@@ -48,8 +47,8 @@ static void fill_directions(const struct slab_solution *solution, double mu_l, s
 		double zenith = slab_slice_zenith(view), sines = sin(zenith) * sqrt(1 - mu_l * mu_l);
 		slab_node_factors(solution, cos(zenith), factor);
 		for (int i = 0; i < N; i++) {
-			directions->view[view][i] = (float)factor[i];
-			directions->view_odd[view][i] = (float)(sines * factor[i]);
+			directions->view[0][i][view] = (float)factor[i];
+			directions->view[1][i][view] = (float)(sines * factor[i]);
 		}
 	}
 	for (int mode = 0; mode < MODES; mode++)
@@ -57,56 +56,94 @@ static void fill_directions(const struct slab_solution *solution, double mu_l, s
 			directions->cosine[mode][i] = (float)cos(mode * slab_slice_azimuth(i));
 }
 
+/* The loops below are written so that each innermost one is a sum of vectors; the same text is compiled for the processor's widest. */
+#define INLINE static inline __attribute__((always_inline))
+
 /* The sun's direction contracted; false when the mode does not matter beside the first. */
-static bool light_mode(const float *pair, const float sun[N], float lit[N], float *first)
+INLINE bool light_mode(const float *pair, const float sun[N], float lit[N], float *first)
 {
 	float largest = 0;
-	memset(lit, 0, N * sizeof *lit);
+	for (int i = 0; i < N; i++)
+		lit[i] = 0;
 	for (int i = 0; i < N; i++) {
-		for (int j = 0; j < i; j++, pair++) {
-			lit[i] += sun[j] * *pair;
-			lit[j] += sun[i] * *pair;
-		}
-		lit[i] += sun[i] * *pair++;
+		float product[N], sum = 0;
+		for (int j = 0; j <= i; j++)
+			product[j] = sun[j] * pair[j];
+		for (int j = 0; j < i; j++)
+			lit[j] += sun[i] * pair[j];
+		for (int j = 0; j <= i; j++)
+			sum += product[j];
+		lit[i] += sum;
+		pair += i + 1;
 	}
 	for (int i = 0; i < N; i++)
-		largest = fmaxf(largest, fabsf(lit[i]));
+		largest = largest > fabsf(lit[i]) ? largest : fabsf(lit[i]);
 	if (*first == 0)
 		*first = largest;
 	return largest > 1e-5f * *first;
 }
 
 /* K of one depth, over views and azimuths. */
-static void fill_depth(const float order2[MODES][SLAB_PAIR_COUNT], const struct directions *directions, float k[VIEWS][AZIMUTHS])
+INLINE void fill_depth_any(const float order2[MODES][SLAB_PAIR_COUNT], const struct directions *directions, float k[VIEWS][AZIMUTHS])
 {
 	float first = 0;
-	memset(k, 0, VIEWS * sizeof *k);
+	for (int view = 0; view < VIEWS; view++)
+		for (int i = 0; i < AZIMUTHS; i++)
+			k[view][i] = 0;
 	for (int mode = 0; mode < MODES; mode++) {
-		float lit[N];
+		float lit[N], value[VIEWS] = {0};
 		if (!light_mode(order2[mode], directions->sun, lit, &first))
 			continue;
-		for (int view = 0; view < VIEWS; view++) {
-			const float *factor = mode % 2 ? directions->view_odd[view] : directions->view[view];
-			float value = 0;
-			for (int i = 0; i < N; i++)
-				value += factor[i] * lit[i];
+		for (int i = 0; i < N; i++)
+			for (int view = 0; view < VIEWS; view++)
+				value[view] += directions->view[mode % 2][i][view] * lit[i];
+		for (int view = 0; view < VIEWS; view++)
 			for (int i = 0; i < AZIMUTHS; i++)
-				k[view][i] += value * directions->cosine[mode][i];
-		}
+				k[view][i] += value[view] * directions->cosine[mode][i];
 	}
+}
+
+typedef void fill_function(const float order2[MODES][SLAB_PAIR_COUNT], const struct directions *directions, float k[VIEWS][AZIMUTHS]);
+
+static void fill_128(const float order2[MODES][SLAB_PAIR_COUNT], const struct directions *directions, float k[VIEWS][AZIMUTHS])
+{
+	fill_depth_any(order2, directions, k);
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2,fma"))) static void fill_256(const float order2[MODES][SLAB_PAIR_COUNT], const struct directions *directions,
+							 float k[VIEWS][AZIMUTHS])
+{
+	fill_depth_any(order2, directions, k);
+}
+#endif
+
+static fill_function *widest_fill(void)
+{
+#ifdef __x86_64__
+	if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+		return fill_256;
+#endif
+	return fill_128;
+}
+
+static void fill_depth(const float order2[MODES][SLAB_PAIR_COUNT], const struct directions *directions, float k[VIEWS][AZIMUTHS])
+{
+	widest_fill()(order2, directions, k);
 }
 
 /* Depth `index` of a band, between those of the solution, into the slice. */
 static void store_depth(const float (*depths)[VIEWS][AZIMUTHS], int index, double shift, int band, struct slab_slice *slice)
 {
 	struct stencil stencil = stencil_at(index + shift, SLAB_DEPTH_COUNT);
-	const float *from = &depths[stencil.first][0][0];
+	const float *from = &depths[stencil.first][0][0], factor[STENCIL] = {(float)stencil.factor[0], (float)stencil.factor[1],
+									     (float)stencil.factor[2], (float)stencil.factor[3]};
 	float *to = &slice->k[index][0][0][band];
 	for (int i = 0; i < VIEWS * AZIMUTHS; i++) {
-		double sum = 0;
+		float sum = 0;
 		for (int k = 0; k < STENCIL; k++)
-			sum += stencil.factor[k] * from[k * VIEWS * AZIMUTHS + i];
-		to[i * BAND_COUNT] = fmaxf((float)sum, 0);
+			sum += factor[k] * from[k * VIEWS * AZIMUTHS + i];
+		to[i * BAND_COUNT] = sum > 0 ? sum : 0;
 	}
 }
 

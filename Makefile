@@ -88,8 +88,8 @@ $(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -fPIC $(call pkg,--cflags,OpenImageIO) -c $< -o $@
 
-# The Mie loops are the one place where the compiler's best vector code is worth asking for.
-$(B)/renderer/optics/%.c.o: OPT := -O3 -g -ffp-contract=fast
+# The loops of the optics are the one place where the compiler's best vector code is worth asking for: nobody there reads errno or traps.
+$(B)/renderer/optics/%.c.o: OPT := -O3 -g -ffp-contract=fast -fno-math-errno -fno-trapping-math
 
 # Shaders and resources are embedded unchanged; the table maps names to bytes (renderer/embed.h).
 $(B)/gen/shaders.S: $(SHADERS) scripts/embed.sh

@@ -8,9 +8,11 @@
  * - Scatterings by the forward peak at a path's end are traced from the viewer (renderer/optics/photon_views.h says how and why). The plain
  *   estimate would need a hundred times as many photons for droplets of 7 um, and thousands for 30 um.
  *
- * Standard errors. Photons are independent, so each error is the spread of all photons' values over sqrt(photons), and as trustworthy as
- * the value itself; values of different directions come from the same photons and err together. A million photons give radiance to 0.1 to
- * 0.6 % at tau 0.5, 0.2 to 0.9 % at tau 8, reflected 0.2 to 0.8 and transmitted 0.5 to 2 % at tau 50, worst for views at the horizon.
+ * Standard errors. Photons are independent, so each error is the spread of all photons' values over sqrt(photons); values of different
+ * directions come from the same photons and err together. A million photons give radiance, in the median over directions up to 85 degrees
+ * from the vertical, to 0.1 to 0.4 % at tau 0.5 and at tau 8, at tau 50 reflected to 0.2 and transmitted to 0.8 %; at 85 degrees to 2 or 3
+ * times that. What few photons contribute to is skewed: where the error is above some 10 %, as may be at the horizon itself, it is a rough
+ * one.
  *
  * Time: a thick layer scatters a photon 6/7 (1 + 2 mu_l) tau times on average (diffusion; a few times less in thin ones), at 15 to 25
  * million scatterings per second and processor. The longest ways end exponentially, by a factor e per 0.3 (1-g) (tau + 1.4/(1-g))^2

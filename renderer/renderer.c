@@ -241,14 +241,14 @@ static void fill_illuminance(struct job *job)
 
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is
- * looked at. A white sheet in that light comes out at 0.6 before tone; most of a change of light is followed, as an eye does, but not all,
+ * looked at. A white sheet in that light comes out at 0.5 before tone; most of a change of light is followed, as an eye does, but not all,
  * so that dusk stays darker than noon. */
 static double exposure_of(const struct scene *scene, const struct frame *frame, double beam_lux)
 {
 	if (!scene->output.exposure_auto)
 		return scene->output.exposure_ev;
 	const double lux = fmax(0.65 * frame->diffuse_illuminance_lux + 0.45 * frame->direct_illuminance_lux + 0.08 * beam_lux, 1e-2);
-	return log2(0.6 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.1 * log2(lux / 40000);
+	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000);
 }
 
 static int list_layers(const struct scene *scene, enum layer *layers)

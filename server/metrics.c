@@ -12,6 +12,8 @@ static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/optic
 						     "/openapi.yaml", "/healthz",   "/readyz", "/metrics",    "other"};
 static const char *const rejection_names[REJECTION_COUNT] = {"full", "starting", "shutting_down"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
+static const char *const source_names[DROPLET_SOURCE_COUNT] = {
+	[DROPLETS_FROM_MEMORY] = "memory", [DROPLETS_FROM_DISK] = "disk", [DROPLETS_COMPUTED] = "computed"};
 
 /* Every status that is sent; the last stands for all others. */
 static const unsigned statuses[] = {200, 304, 400, 404, 405, 406, 413, 415, 422, 499, 500, 503, 504, 0};
@@ -161,9 +163,9 @@ static void write_stages(struct text *text, const struct metrics *metrics)
 
 static void write_queue(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
 {
-	write_family(text, "queue_depth", "gauge", "Renders waiting.");
+	write_family(text, "queue_depth", "gauge", "Renders waiting, for their droplets or for the renderer.");
 	text_printf(text, "stratus_queue_depth %zu\n", now->queue_depth);
-	write_family(text, "queue_limit", "gauge", "Renders that may wait.");
+	write_family(text, "queue_limit", "gauge", "Renders that may wait for each.");
 	text_printf(text, "stratus_queue_limit %zu\n", now->queue_limit);
 	write_family(text, "requests_in_flight", "gauge", "Requests being answered, this one included.");
 	text_printf(text, "stratus_requests_in_flight %zu\n", now->requests_in_flight);
@@ -173,6 +175,18 @@ static void write_queue(struct text *text, const struct metrics *metrics, const 
 	write_family(text, "renders_ended", "counter", "Accepted renders that brought no picture, by reason.");
 	for (int i = 0; i < END_COUNT; i++)
 		text_printf(text, "stratus_renders_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->ended[i]);
+}
+
+static void write_droplets(struct text *text, const struct droplet_store_counts *counts)
+{
+	write_family(text, "droplet_tables", "counter", "Uses of the tables of a droplet distribution, by where they came from.");
+	for (int i = 0; i < DROPLET_SOURCE_COUNT; i++)
+		text_printf(text, "stratus_droplet_tables_total{source=\"%s\"} %llu\n", source_names[i],
+			    (unsigned long long)counts->from[i]);
+	write_family(text, "droplet_files_damaged", "counter", "Files of such tables that were damaged or foreign, and computed anew.");
+	text_printf(text, "stratus_droplet_files_damaged_total %llu\n", (unsigned long long)counts->damaged_files);
+	write_family(text, "droplet_tables_bytes", "gauge", "Memory of such tables.");
+	text_printf(text, "stratus_droplet_tables_bytes %llu\n", (unsigned long long)counts->memory_bytes);
 }
 
 static void write_label(struct text *text, const char *name, const char *value)
@@ -227,6 +241,7 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_requests(&text, copy);
 	write_stages(&text, copy);
 	write_queue(&text, copy, now);
+	write_droplets(&text, &now->droplets);
 	write_infos(&text, now->info);
 	write_process(&text);
 	text_add(&text, "# EOF\n");

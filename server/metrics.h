@@ -5,6 +5,7 @@
 #ifndef STRATUS_SERVER_METRICS_H
 #define STRATUS_SERVER_METRICS_H
 
+#include "renderer/droplet_store.h"
 #include "server/server_timing.h"
 
 enum metrics_route {
@@ -41,6 +42,7 @@ void metrics_count_end(struct metrics *metrics, enum metrics_end end);
 struct metrics_now {
 	const struct renderer_info *info;
 	size_t queue_depth, queue_limit, requests_in_flight;
+	struct droplet_store_counts droplets;
 };
 
 /* The caller frees; NULL when out of memory. */

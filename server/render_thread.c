@@ -4,8 +4,10 @@
 #include "server/clock.h"
 #include "server/kernel_file.h"
 
+#include <limits.h>
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 /* So many failures on end are taken for a dead context rather than for bad luck. */
@@ -16,32 +18,25 @@ struct render_thread {
 	struct render_queue *queue;
 	pthread_t thread;
 	struct kernel *kernel;
+	struct droplet_store *droplets;
 	struct renderer *renderer;
-	_Atomic int state; /* enum render_thread_state; kernel and renderer are set before it says READY */
+	_Atomic int state; /* enum render_thread_state; kernel, droplets and renderer are set before it says READY */
 	_Atomic double busy_since_ms, typical_ms;
 	int failures; /* on end */
 };
 
-static bool is_expired(const struct render_job *job)
-{
-	return clock_now_ms() >= job->deadline_ms;
-}
-
 static bool is_cancelled(void *context)
 {
-	struct render_job *job = context;
-	return is_expired(job) || job->abandoned(job);
+	return render_job_is_over(context);
 }
 
 static enum render_outcome render(struct render_thread *thread, struct render_job *job)
 {
-	if (is_expired(job))
-		return RENDER_OUTCOME_EXPIRED;
-	if (job->abandoned(job))
-		return RENDER_OUTCOME_ABANDONED;
+	if (render_job_is_over(job))
+		return job->outcome;
 	enum render_result result = renderer_render(thread->renderer, job->scene, is_cancelled, job, &job->frame);
 	if (result == RENDER_CANCELLED)
-		return is_expired(job) ? RENDER_OUTCOME_EXPIRED : RENDER_OUTCOME_ABANDONED;
+		return job->outcome;
 	/* A scene that does not fit says nothing about the next one: only a failing device turns the daemon's health. */
 	if (result == RENDER_OUT_OF_MEMORY)
 		return RENDER_OUTCOME_NO_MEMORY;
@@ -58,7 +53,6 @@ static void run_jobs(struct render_thread *thread)
 	for (struct render_job *job; (job = render_queue_pop(thread->queue));) {
 		double start = clock_now_ms();
 		thread->busy_since_ms = start;
-		job->waited_ms = start - job->queued_ms;
 		job->outcome = render(thread, job);
 		double took = clock_now_ms() - start;
 		if (job->outcome == RENDER_OUTCOME_OK)
@@ -68,11 +62,26 @@ static void run_jobs(struct render_thread *thread)
 	}
 }
 
+static bool open_droplets(struct render_thread *thread)
+{
+	const struct config *config = thread->config;
+	char directory[PATH_MAX];
+	struct droplet_store_params params = {.kernel = thread->kernel,
+					      .memory_bytes = (size_t)config->droplets_mb << 20,
+					      .disk_bytes = (uint64_t)config->droplets_disk_mb << 20};
+	if (snprintf(directory, sizeof directory, "%s/droplets", config->state_dir) >= (int)sizeof directory)
+		log_warning("state directory %s: its name is too long to keep droplets in it", config->state_dir);
+	else if (config->droplets_disk_mb > 0)
+		params.directory = directory;
+	thread->droplets = droplet_store_create(&params);
+	return thread->droplets != NULL;
+}
+
 static bool start(struct render_thread *thread)
 {
 	const struct config *config = thread->config;
 	thread->kernel = kernel_file_open(config->kernel, config->state_dir);
-	if (!thread->kernel)
+	if (!thread->kernel || !open_droplets(thread))
 		return false;
 	const struct renderer_params params = {
 		.device_index = config->device,
@@ -80,6 +89,7 @@ static bool start(struct render_thread *thread)
 		.pass_kind = (enum pass_kind)config->pass_kind,
 		.shader_dir = config->shader_dir,
 		.kernel = thread->kernel,
+		.droplets = thread->droplets,
 		.cache_bytes = (size_t)config->cache_mb << 20,
 	};
 	thread->renderer = renderer_create(&params);
@@ -125,6 +135,7 @@ void render_thread_destroy(struct render_thread *thread)
 	if (!thread)
 		return;
 	pthread_join(thread->thread, NULL);
+	droplet_store_destroy(thread->droplets);
 	kernel_destroy(thread->kernel);
 	free(thread);
 }
@@ -142,6 +153,11 @@ const struct renderer_info *render_thread_info(const struct render_thread *threa
 const struct kernel *render_thread_kernel(const struct render_thread *thread)
 {
 	return thread->kernel;
+}
+
+struct droplet_store *render_thread_droplets(const struct render_thread *thread)
+{
+	return thread->droplets;
 }
 
 double render_thread_busy_ms(const struct render_thread *thread)

@@ -1,9 +1,10 @@
-/* The one thread that owns the renderer and with it the OpenGL context. It loads the kernel table, brings the renderer up, then takes jobs
- * from the queue until that is closed and empty.
+/* The one thread that owns the renderer and with it the OpenGL context. It loads the kernel table, opens the droplet tables, brings
+ * the renderer up, then takes jobs from the queue until that is closed and empty.
  */
 #ifndef STRATUS_SERVER_RENDER_THREAD_H
 #define STRATUS_SERVER_RENDER_THREAD_H
 
+#include "renderer/droplet_store.h"
 #include "server/config.h"
 #include "server/render_queue.h"
 
@@ -14,7 +15,7 @@ struct render_thread;
 /* Both arguments must outlive the thread. NULL (and a log line) on failure. */
 struct render_thread *render_thread_create(const struct config *config, struct render_queue *queue);
 
-/* Close the queue first: waits until every job in it is done. Takes NULL. */
+/* Close the queue first: waits until every job in it is done. All droplet tables must have been released. Takes NULL. */
 void render_thread_destroy(struct render_thread *thread);
 
 /* Any thread. RENDER_THREAD_FAILED: it did not come up (the log says why), or fails job after job. */
@@ -23,6 +24,7 @@ enum render_thread_state render_thread_state(const struct render_thread *thread)
 /* Any thread, once the state has been RENDER_THREAD_READY. */
 const struct renderer_info *render_thread_info(const struct render_thread *thread);
 const struct kernel *render_thread_kernel(const struct render_thread *thread);
+struct droplet_store *render_thread_droplets(const struct render_thread *thread);
 
 /* Milliseconds the running job has taken so far, 0 when idle. Any thread. */
 double render_thread_busy_ms(const struct render_thread *thread);

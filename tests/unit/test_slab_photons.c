@@ -472,9 +472,10 @@ static void print_tally(const struct tally *tally, const char *what)
 		      tally->worst, tally->where);
 }
 
-static void judge_layer(const struct optics *optics, const struct slab_solution *solution, int band, struct tally *fluxes,
+static void judge_layer(const struct fixture *fixture, int i, const struct slab_solution *solution, int band, struct tally *fluxes,
 			struct tally *radiances)
 {
+	const struct optics *optics = fixture->optics[i];
 	double tau = 0.1 * pow(1000, random_unit());
 	struct photon_params params = params_for(optics, tau, 85 * random_unit(), tau < 10 ? 30000 : 10000);
 	params.band = band;
@@ -482,7 +483,8 @@ static void judge_layer(const struct optics *optics, const struct slab_solution 
 	struct photon_result result = trace(&params);
 	struct slab_flux flux = slab_flux_at(solution, band, tau, params.mu_l);
 	char where[128];
-	snprintf(where, sizeof where, "at tau %.3g, sun at %.1f, band %d", tau, acos(params.mu_l) / DEGREE, band);
+	int used = snprintf(where, sizeof where, "at gamma %g, re %g, band %d, tau %.3g, sun at %.1f", droplets[i][0], droplets[i][1], band,
+			    tau, acos(params.mu_l) / DEGREE);
 	count(fluxes, flux.reflected, result.flux.reflected, result.flux_error.reflected, where);
 	count(fluxes, flux.transmitted, result.flux.transmitted, result.flux_error.transmitted, where);
 	for (int k = 0; k < DIRECTIONS; k++) {
@@ -491,8 +493,8 @@ static void judge_layer(const struct optics *optics, const struct slab_solution 
 		if (scattering_angle(side, params.mu_l, mu_v, azimuth) < 3 * DEGREE)
 			continue;
 		double value = slab_radiance(solution, optics, band, side, tau, params.mu_l, mu_v, azimuth);
-		snprintf(where, sizeof where, "at tau %.3g, sun at %.1f, band %d, side %d, view at %g, %g", tau, acos(params.mu_l) / DEGREE,
-			 band, side, zenith_deg[k / AZIMUTHS % VIEWS], azimuth_deg[k % AZIMUTHS]);
+		snprintf(where + used, sizeof where - (size_t)used, ", side %d, view at %g, %g", side, zenith_deg[k / AZIMUTHS % VIEWS],
+			 azimuth_deg[k % AZIMUTHS]);
 		count(radiances, value, result.radiance[k], result.radiance_error[k], where);
 	}
 	photon_result_finish(&result);
@@ -506,7 +508,7 @@ static void judges_the_solved_slab(void **state)
 		struct slab_solution *solution = slab_solve(fixture->optics[i], 2);
 		assert_non_null(solution);
 		for (int k = 0; k < 9; k++)
-			judge_layer(fixture->optics[i], solution, k % BAND_COUNT, &fluxes, &radiances);
+			judge_layer(fixture, i, solution, k % BAND_COUNT, &fluxes, &radiances);
 		slab_destroy(solution);
 	}
 	print_tally(&fluxes, "fluxes");

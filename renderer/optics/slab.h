@@ -77,6 +77,17 @@ double slab_radiance_single(const struct slab_solution *solution, const struct o
 double slab_radiance_multiple(const struct slab_solution *solution, int band, enum slab_side side, double tau, double mu_l, double mu_v,
 			      double azimuth);
 
+/* Orders >= 2 as a series in azimuth, for many azimuths of one pair of directions: 12 us, and 0.1 us for an azimuth of it. */
+struct slab_series {
+	double mode[SLAB_MODE_COUNT];
+};
+void slab_multiple_series(const struct slab_solution *solution, int band, enum slab_side side, double tau, double mu_l, double mu_v,
+			  struct slab_series *series);
+double slab_series_radiance(const struct slab_series *series, double azimuth);
+
+/* Cosine of the scattering angle, -1..1. mu_l and mu_v in 0..1, azimuth finite. */
+double slab_scattering_cosine(enum slab_side side, double mu_l, double mu_v, double azimuth);
+
 /* --- fluxes; any thread -------------------------------------------------------------------------------------------------------- */
 
 /* Fractions of the incident flux. Reflected and transmitted fractions are sums of their own; nothing is normalised. */

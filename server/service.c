@@ -72,7 +72,7 @@ struct service *service_create(const struct config *config)
 	service->listening_socket = -1;
 	service->metrics = metrics_create();
 	service->queue = render_queue_create((size_t)config->queue_length);
-	service->workers = worker_pool_create(workers, 2 * workers);
+	service->workers = worker_pool_create(workers, 2 * workers, 0);
 	if (service->metrics && service->queue && service->workers && http_start(service) && start_rendering(service))
 		return service;
 	service_destroy(service);

@@ -21,6 +21,17 @@ struct MHD_Response *response_create(char *data, size_t size)
 	return response;
 }
 
+static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size_t size)
+{
+	(void)context, (void)position, (void)buffer, (void)size;
+	return MHD_CONTENT_READER_END_OF_STREAM;
+}
+
+struct MHD_Response *response_create_unsized(void)
+{
+	return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1024, read_nothing, NULL, NULL);
+}
+
 void response_set(struct MHD_Response *response, const char *name, const char *value)
 {
 	if (response && MHD_add_response_header(response, name, value) != MHD_YES)

@@ -22,11 +22,11 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 
 # Debian packages: to build and run, and to test. scripts/packages.sh installs those that are missing.
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
-	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libcurl4-openssl-dev ca-certificates curl
+	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml clang-format procps
 
 pkg = $(shell pkg-config $(1) $(2))
-GL_LIBS = $(call pkg,--libs,epoxy) -lEGL -lm
+RENDERER_LIBS = $(call pkg,--libs,epoxy cminpack) -lEGL -lm
 SERVER_LIBS = $(call pkg,--libs,libmicrohttpd jansson nettle) -lnova -ldl
 CLIENT_LIBS = $(call pkg,--libs,libcurl jansson)
 
@@ -70,11 +70,11 @@ $(B)/libserver.a: $(call obj,$(SERVER_SRC)) $(B)/gen/resources.o
 	rm -f $@; ar rcs $@ $^
 
 $(B)/stratusd: $(call obj,server/main.c) $(B)/libserver.a $(B)/librenderer.a
-	$(CC) $(LDFLAGS) $^ -o $@ $(SERVER_LIBS) $(GL_LIBS)
+	$(CC) $(LDFLAGS) $^ -o $@ $(SERVER_LIBS) $(RENDERER_LIBS)
 $(B)/stratus: $(call obj,$(CLIENT_SRC))
 	$(CC) $(LDFLAGS) $^ -o $@ $(CLIENT_LIBS) -lm
 $(B)/render-bench: $(call obj,renderer/programs/bench.c) $(B)/librenderer.a
-	$(CC) $(LDFLAGS) $^ -o $@ $(GL_LIBS) -ldl
+	$(CC) $(LDFLAGS) $^ -o $@ $(RENDERER_LIBS) -ldl
 $(B)/stratus-image.so: $(call obj,renderer/image/oiio.cpp) $(B)/pic/renderer/scene.c.o
 	$(CXX) $(LDFLAGS) -shared $^ -o $@ $(call pkg,--libs,OpenImageIO zlib)
 
@@ -87,6 +87,8 @@ $(B)/pic/%.c.o: %.c
 $(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -fPIC $(call pkg,--cflags,OpenImageIO) -c $< -o $@
+
+$(B)/renderer/optics/paper_fit_solve.c.o: CFLAGS += $(call pkg,--cflags,cminpack)
 
 # The Mie loops are the one place where the compiler's best vector code is worth asking for.
 $(B)/renderer/optics/%.c.o: OPT := -O3 -g -ffp-contract=fast
@@ -103,10 +105,10 @@ $(B)/gen/%.o: $(B)/gen/%.S
 
 $(B)/tests/%: tests/unit/%.c $(B)/libserver.a $(B)/librenderer.a
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) $(CFLAGS) -MF $@.d $< $(B)/libserver.a $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(SERVER_LIBS) $(GL_LIBS)
+	$(CC) $(CPPFLAGS) $(CFLAGS) -MF $@.d $< $(B)/libserver.a $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(SERVER_LIBS) $(RENDERER_LIBS)
 $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 	@mkdir -p $(@D)
-	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(GL_LIBS)
+	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(RENDERER_LIBS)
 
 -include $(shell find $(B) -name '*.d' 2>/dev/null)
 

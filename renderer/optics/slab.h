@@ -98,8 +98,14 @@ struct slab_flux {
 };
 struct slab_flux slab_flux_at(const struct slab_solution *solution, int band, double tau, double mu_l);
 
+/* The same at `count` depths under one angle, at less than count times the cost. */
+void slab_flux_row(const struct slab_solution *solution, int band, double mu_l, const double *tau, int count, struct slab_flux *flux);
+
 /* Under uniform diffuse light; direct is the unscattered part, 2 E_3(tau). */
 struct slab_flux slab_flux_spherical(const struct slab_solution *solution, int band, double tau);
+
+/* Its reflected part alone, 20 times faster. */
+double slab_spherical_albedo(const struct slab_solution *solution, int band, double tau);
 
 /* Fractions of the incident flux by number of scatterings 0, 1, 2, 3 and more; r[0] is 0. */
 struct slab_orders {
@@ -114,25 +120,33 @@ struct slab_orders slab_orders_at(const struct optics *optics, int band, enum sl
 
 /* --- a renderer's table -------------------------------------------------------------------------------------------------------- */
 
-enum { SLAB_SLICE_VIEW_COUNT = 32, SLAB_SLICE_AZIMUTH_COUNT = 32 };
+enum { SLAB_SLICE_DEPTH_COUNT = SLAB_DEPTH_COUNT + 1, SLAB_SLICE_VIEW_COUNT = 32, SLAB_SLICE_AZIMUTH_COUNT = 32 };
 
-/* K of orders >= 2 for one mu_l, both sides, bands as the last index: view i at slab_slice_zenith(i), azimuth j at
- * j/(SLAB_SLICE_AZIMUTH_COUNT-1) pi, depth k at slab_depth(k). Made for linear interpolation in these indices. 1.5 MB. */
+/* K of orders >= 2 for one mu_l and one side, bands as the last index: view i at slab_slice_zenith(i), azimuth j at
+ * j/(SLAB_SLICE_AZIMUTH_COUNT-1) pi, depth k at slab_slice_depth = k. Made for linear interpolation in these indices, all bands at once.
+ * 0.8 MB. */
 struct slab_slice {
 	double mu_l;
-	float k[SLAB_SIDE_COUNT][SLAB_DEPTH_COUNT][SLAB_SLICE_VIEW_COUNT][SLAB_SLICE_AZIMUTH_COUNT][BAND_COUNT];
+	enum slab_side side;
+	double depth_ratio[BAND_COUNT]; /* optical thickness of the band over the one that the table is read with */
+	float k[SLAB_SLICE_DEPTH_COUNT][SLAB_SLICE_VIEW_COUNT][SLAB_SLICE_AZIMUTH_COUNT][BAND_COUNT];
 };
 
-/* Fills a table; 12 ms; any thread. */
-void slab_slice_fill(const struct slab_solution *solution, double mu_l, struct slab_slice *slice);
+/* Fills a table; 3 ms; any thread. depth_ratio as above, 0.5 .. 2. */
+void slab_slice_fill(const struct slab_solution *solution, enum slab_side side, double mu_l, const double depth_ratio[BAND_COUNT],
+		     struct slab_slice *slice);
 
-/* Radiance of orders >= 2 from the table as a shader would look it up. */
-double slab_slice_radiance(const struct slab_solution *solution, const struct slab_slice *slice, int band, enum slab_side side, double tau,
-			   double mu_v, double azimuth);
+/* Radiance of orders >= 2 from the table as a shader would look it up; tau is that which the table is read with, at 550 nm. */
+double slab_slice_radiance(const struct slab_solution *solution, const struct slab_slice *slice, int band, double tau, double mu_v,
+			   double azimuth);
 
 /* Zenith angle of a view index, 0..pi/2, denser towards the horizon: pi/2 sin(pi/2 i/(SLAB_SLICE_VIEW_COUNT-1)), and its inverse. */
 double slab_slice_zenith(double view);
 double slab_slice_view(double mu_v);
+
+/* Index of a depth at 550 nm: slab_depth_coordinate as far as that goes; from there to the last, which is infinitely deep, linear in the
+ * transmittance. */
+double slab_slice_depth(const struct slab_solution *solution, double tau);
 
 /* --- coordinates --------------------------------------------------------------------------------------------------------------- */
 

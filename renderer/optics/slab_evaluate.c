@@ -5,15 +5,9 @@
 #include <math.h>
 #include <string.h>
 
-enum { N = SLAB_NODE_COUNT, STENCIL = 4 };
+enum { N = SLAB_NODE_COUNT };
 
-/* Four neighbours on a grid of unit steps and Lagrange's coefficients. */
-struct stencil {
-	int first;
-	double factor[STENCIL];
-};
-
-static struct stencil stencil_at(double x, int count)
+struct stencil stencil_at(double x, int count)
 {
 	struct stencil stencil;
 	int first = (int)x - 1;
@@ -148,7 +142,7 @@ double slab_radiance_multiple(const struct slab_solution *solution, int band, en
 
 /* --- the first order ----------------------------------------------------------------------------------------------------------- */
 
-static double residual_at(const struct slab_band *band, enum slab_side side, double angle, double s)
+double slab_residual_at(const struct slab_band *band, enum slab_side side, double angle, double s)
 {
 	struct stencil column = stencil_at(slab_residual_angle_index(angle), SLAB_RESIDUAL_ANGLE_COUNT);
 	struct stencil row = stencil_at(slab_residual_depth_index(s), SLAB_RESIDUAL_DEPTH_COUNT);
@@ -190,7 +184,7 @@ double slab_radiance_single(const struct slab_solution *solution, const struct o
 	double geometry = slab_single_geometry(side, (1 - table->truncated) * clamp_depth(tau), mu_l, mu_v, &s);
 	if (!(geometry > 0))
 		return 0;
-	double phase = optics_phase(optics, band, angle) / (1 - table->truncated) + residual_at(table, side, angle, s);
+	double phase = optics_phase(optics, band, angle) / (1 - table->truncated) + slab_residual_at(table, side, angle, s);
 	return fmax(phase, 0) * geometry / (4 * M_PI);
 }
 
@@ -203,25 +197,39 @@ double slab_radiance(const struct slab_solution *solution, const struct optics *
 
 /* --- fluxes -------------------------------------------------------------------------------------------------------------------- */
 
-struct slab_flux slab_flux_at(const struct slab_solution *solution, int band, double tau, double mu_l)
+void slab_flux_row(const struct slab_solution *solution, int band, double mu_l, const double *tau, int count, struct slab_flux *flux)
 {
 	const struct slab_band *table = &solution->band[band];
+	double node[N], column[SLAB_SIDE_COUNT][SLAB_DEPTH_COUNT];
 	mu_l = clamp_unit(mu_l);
-	tau = clamp_depth(tau);
-	double node[N], side_sum[SLAB_SIDE_COUNT] = {0};
 	slab_node_factors(solution, mu_l, node);
-	struct stencil depth = stencil_at(slab_depth_coordinate(tau), SLAB_DEPTH_COUNT);
 	for (int side = 0; side < SLAB_SIDE_COUNT; side++)
-		for (int k = 0; k < STENCIL; k++)
+		for (int k = 0; k < SLAB_DEPTH_COUNT; k++) {
+			column[side][k] = 0;
 			for (int i = 0; i < N; i++)
-				side_sum[side] += depth.factor[k] * node[i] * table->flux[side][depth.first + k][i];
-	double share = slab_thick_share(table, tau), s = slant((1 - table->truncated) * tau, mu_l), scattered = lost(s);
-	double through = side_sum[SLAB_TRANSMITTED];
-	return (struct slab_flux){
-		.reflected = scattered * (side_sum[SLAB_REFLECTED] + (1 - share) * through),
-		.transmitted = exp(-s) + scattered * share * through,
-		.direct = exp(-slant(tau, mu_l)),
-	};
+				column[side][k] += node[i] * table->flux[side][k][i];
+		}
+	for (int i = 0; i < count; i++) {
+		double depth = clamp_depth(tau[i]), side_sum[SLAB_SIDE_COUNT] = {0};
+		struct stencil stencil = stencil_at(slab_depth_coordinate(depth), SLAB_DEPTH_COUNT);
+		for (int side = 0; side < SLAB_SIDE_COUNT; side++)
+			for (int k = 0; k < STENCIL; k++)
+				side_sum[side] += stencil.factor[k] * column[side][stencil.first + k];
+		double share = slab_thick_share(table, depth), s = slant((1 - table->truncated) * depth, mu_l), scattered = lost(s);
+		double through = side_sum[SLAB_TRANSMITTED];
+		flux[i] = (struct slab_flux){
+			.reflected = scattered * (side_sum[SLAB_REFLECTED] + (1 - share) * through),
+			.transmitted = exp(-s) + scattered * share * through,
+			.direct = exp(-slant(depth, mu_l)),
+		};
+	}
+}
+
+struct slab_flux slab_flux_at(const struct slab_solution *solution, int band, double tau, double mu_l)
+{
+	struct slab_flux flux;
+	slab_flux_row(solution, band, mu_l, &tau, 1, &flux);
+	return flux;
 }
 
 /* 2 E_3(tau) = 2 integral exp(-tau/mu) mu dmu: below 1e-12 beyond 40. */
@@ -239,10 +247,9 @@ static double direct_diffuse(double tau)
 	return sum * -low / STEPS / 3;
 }
 
-struct slab_flux slab_flux_spherical(const struct slab_solution *solution, int band, double tau)
+static struct slab_flux spherical_at(const struct slab_solution *solution, int band, double tau)
 {
 	const struct slab_band *table = &solution->band[band];
-	tau = clamp_depth(tau);
 	double first = slab_depth(0), sum[SLAB_SIDE_COUNT] = {0};
 	struct stencil depth = stencil_at(slab_depth_coordinate(tau), SLAB_DEPTH_COUNT);
 	for (int side = 0; side < SLAB_SIDE_COUNT; side++)
@@ -253,5 +260,17 @@ struct slab_flux slab_flux_spherical(const struct slab_solution *solution, int b
 		r *= tau / first;
 		t = 1 - (1 - t) * tau / first;
 	}
-	return (struct slab_flux){.reflected = r + (1 - share) * t, .transmitted = share * t, .direct = direct_diffuse(tau)};
+	return (struct slab_flux){.reflected = r + (1 - share) * t, .transmitted = share * t};
+}
+
+struct slab_flux slab_flux_spherical(const struct slab_solution *solution, int band, double tau)
+{
+	struct slab_flux flux = spherical_at(solution, band, clamp_depth(tau));
+	flux.direct = direct_diffuse(clamp_depth(tau));
+	return flux;
+}
+
+double slab_spherical_albedo(const struct slab_solution *solution, int band, double tau)
+{
+	return spherical_at(solution, band, clamp_depth(tau)).reflected;
 }

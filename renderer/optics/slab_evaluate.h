@@ -4,6 +4,17 @@
 
 #include "renderer/optics/slab.h"
 
+enum { STENCIL = 4 };
+
+/* Four neighbours on a grid of unit steps and Lagrange's coefficients. */
+struct stencil {
+	int first;
+	double factor[STENCIL];
+};
+
+/* At x in 0..count-1, of a grid of `count` >= 4; beyond it by the same cubic. */
+struct stencil stencil_at(double x, int count);
+
 /* Coefficients of the polynomial through the solution's nodes, at mu in 0..1. */
 void slab_node_factors(const struct slab_solution *solution, double mu, double factor[SLAB_NODE_COUNT]);
 

@@ -29,6 +29,9 @@ double slab_residual_depth_index(double s);
 /* Fills band->residual[side] for band->truncated. Any thread. */
 void slab_residual_fill(const struct optics *optics, int band, enum slab_side side, struct slab_band *result);
 
+/* The table's value at an angle and depth, by cubics through its neighbours. Any thread. */
+double slab_residual_at(const struct slab_band *band, enum slab_side side, double angle, double s);
+
 /* Mean of exp(-(a u + b (1 - u))) over u = 0..1 for a, b >= 0 (infinity: 0): attenuation of light scattered once on its way through. */
 double slab_mean_attenuation(double a, double b);
 

@@ -46,20 +46,34 @@ static void fill_directions(const struct slab_solution *solution, double mu_l, s
 			directions->cosine[mode][i] = (float)cos(mode * M_PI * i / (AZIMUTHS - 1));
 }
 
+/* The sun's direction contracted; false when the mode does not matter beside the first. */
+static bool light_mode(const float *pair, const float sun[N], float lit[N], float *first)
+{
+	float largest = 0;
+	memset(lit, 0, N * sizeof *lit);
+	for (int i = 0; i < N; i++) {
+		for (int j = 0; j < i; j++, pair++) {
+			lit[i] += sun[j] * *pair;
+			lit[j] += sun[i] * *pair;
+		}
+		lit[i] += sun[i] * *pair++;
+	}
+	for (int i = 0; i < N; i++)
+		largest = fmaxf(largest, fabsf(lit[i]));
+	if (*first == 0)
+		*first = largest;
+	return largest > 1e-5f * *first;
+}
+
 /* K of one depth, over views and azimuths. */
 static void fill_depth(const float order2[MODES][SLAB_PAIR_COUNT], const struct directions *directions, float k[VIEWS][AZIMUTHS])
 {
+	float first = 0;
 	memset(k, 0, VIEWS * sizeof *k);
 	for (int mode = 0; mode < MODES; mode++) {
-		float lit[N] = {0};
-		const float *pair = order2[mode];
-		for (int i = 0; i < N; i++) {
-			for (int j = 0; j < i; j++, pair++) {
-				lit[i] += directions->sun[j] * *pair;
-				lit[j] += directions->sun[i] * *pair;
-			}
-			lit[i] += directions->sun[i] * *pair++;
-		}
+		float lit[N];
+		if (!light_mode(order2[mode], directions->sun, lit, &first))
+			continue;
 		for (int view = 0; view < VIEWS; view++) {
 			const float *factor = mode % 2 ? directions->view_odd[view] : directions->view[view];
 			float value = 0;
@@ -71,20 +85,51 @@ static void fill_depth(const float order2[MODES][SLAB_PAIR_COUNT], const struct 
 	}
 }
 
-void slab_slice_fill(const struct slab_solution *solution, double mu_l, struct slab_slice *slice)
+/* Depth `index` of a band, between those of the solution, into the slice. */
+static void store_depth(const float (*depths)[VIEWS][AZIMUTHS], int index, double shift, int band, struct slab_slice *slice)
+{
+	struct stencil stencil = stencil_at(index + shift, SLAB_DEPTH_COUNT);
+	const float *from = &depths[stencil.first][0][0];
+	float *to = &slice->k[index][0][0][band];
+	for (int i = 0; i < VIEWS * AZIMUTHS; i++) {
+		double sum = 0;
+		for (int k = 0; k < STENCIL; k++)
+			sum += stencil.factor[k] * from[k * VIEWS * AZIMUTHS + i];
+		to[i * BAND_COUNT] = fmaxf((float)sum, 0);
+	}
+}
+
+/* An infinitely deep layer reflects what the last one transmits, in the same directions, and transmits nothing. */
+static void store_infinite(const struct slab_band *table, const struct directions *directions, int band, struct slab_slice *slice)
+{
+	float through[VIEWS][AZIMUTHS];
+	fill_depth(table->order2[SLAB_TRANSMITTED][SLAB_DEPTH_COUNT - 1], directions, through);
+	for (int view = 0; view < VIEWS; view++)
+		for (int i = 0; i < AZIMUTHS; i++)
+			slice->k[SLAB_DEPTH_COUNT][view][i][band] =
+				slice->side == SLAB_TRANSMITTED
+					? 0
+					: slice->k[SLAB_DEPTH_COUNT - 1][view][i][band] + fmaxf(through[view][i], 0);
+}
+
+void slab_slice_fill(const struct slab_solution *solution, enum slab_side side, double mu_l, const double depth_ratio[BAND_COUNT],
+		     struct slab_slice *slice)
 {
 	struct directions directions;
+	float depths[SLAB_DEPTH_COUNT][VIEWS][AZIMUTHS];
 	slice->mu_l = fmin(fmax(mu_l, 0), 1);
+	slice->side = side;
 	fill_directions(solution, slice->mu_l, &directions);
-	for (int side = 0; side < SLAB_SIDE_COUNT; side++)
+	for (int band = 0; band < BAND_COUNT; band++) {
+		const struct slab_band *table = &solution->band[band];
+		const double shift = slab_depth_coordinate(depth_ratio[band]) - slab_depth_coordinate(1);
+		slice->depth_ratio[band] = depth_ratio[band];
 		for (int depth = 0; depth < SLAB_DEPTH_COUNT; depth++)
-			for (int band = 0; band < BAND_COUNT; band++) {
-				float k[VIEWS][AZIMUTHS];
-				fill_depth(solution->band[band].order2[side][depth], &directions, k);
-				for (int view = 0; view < VIEWS; view++)
-					for (int i = 0; i < AZIMUTHS; i++)
-						slice->k[side][depth][view][i][band] = fmaxf(k[view][i], 0);
-			}
+			fill_depth(table->order2[side][depth], &directions, depths[depth]);
+		for (int depth = 0; depth < SLAB_DEPTH_COUNT; depth++)
+			store_depth(depths, depth, shift, band, slice);
+		store_infinite(table, &directions, band, slice);
+	}
 }
 
 /* Neighbour below and the share of the one above. */
@@ -95,31 +140,25 @@ static int split(double x, int count, double *share)
 	return low;
 }
 
-static double look_up(const struct slab_slice *slice, int band, enum slab_side side, double tau, double mu_v, double azimuth)
+double slab_slice_depth(const struct slab_solution *solution, double tau)
+{
+	return slab_depth_coordinate(tau) + 1 - slab_thick_share(&solution->band[1], tau);
+}
+
+double slab_slice_radiance(const struct slab_solution *solution, const struct slab_slice *slice, int band, double tau, double mu_v,
+			   double azimuth)
 {
 	double share[3], sum = 0;
-	int depth = split(slab_depth_coordinate(tau), SLAB_DEPTH_COUNT, &share[0]);
+	mu_v = fmin(fmax(mu_v, 0), 1);
+	tau = fmin(fmax(tau, 0), 1e30);
+	azimuth = isfinite(azimuth) ? azimuth : 0;
+	int depth = split(slab_slice_depth(solution, tau), SLAB_SLICE_DEPTH_COUNT, &share[0]);
 	int view = split(slab_slice_view(mu_v), VIEWS, &share[1]);
 	int column = split(acos(cos(azimuth)) / M_PI * (AZIMUTHS - 1), AZIMUTHS, &share[2]);
 	for (int corner = 0; corner < 8; corner++) {
 		int a = corner & 1, b = corner >> 1 & 1, c = corner >> 2;
 		double weight = (a ? share[0] : 1 - share[0]) * (b ? share[1] : 1 - share[1]) * (c ? share[2] : 1 - share[2]);
-		sum += weight * slice->k[side][depth + a][view + b][column + c][band];
+		sum += weight * slice->k[depth + a][view + b][column + c][band];
 	}
-	return sum;
-}
-
-double slab_slice_radiance(const struct slab_solution *solution, const struct slab_slice *slice, int band, enum slab_side side, double tau,
-			   double mu_v, double azimuth)
-{
-	const struct slab_band *table = &solution->band[band];
-	mu_v = fmin(fmax(mu_v, 0), 1);
-	tau = fmin(fmax(tau, 0), 1e30);
-	azimuth = isfinite(azimuth) ? azimuth : 0;
-	double k = look_up(slice, band, side, tau, mu_v, azimuth), share = slab_thick_share(table, tau);
-	if (share < 1) {
-		double through = look_up(slice, band, SLAB_TRANSMITTED, tau, mu_v, azimuth);
-		k += side == SLAB_TRANSMITTED ? (share - 1) * through : (1 - share) * through;
-	}
-	return k * slab_multiple_scale(table, tau, slice->mu_l, mu_v);
+	return sum * slab_multiple_scale(&solution->band[band], tau * slice->depth_ratio[band], slice->mu_l, mu_v);
 }

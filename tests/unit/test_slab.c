@@ -352,19 +352,22 @@ static void any_droplets(void **state)
 
 static void slices(void **state)
 {
+	static const double ratio[BAND_COUNT] = {1.03, 1, 0.96};
 	struct fixture *fixture = *state;
 	struct slab_slice *slice = malloc(sizeof *slice);
 	assert_non_null(slice);
 	double square = 0, worst = 0;
 	int count = 0;
-	for (int i = 0; i < 20; i++) {
+	for (int i = 0; i < 40; i++) {
 		double mu_l = 0.03 + 0.97 * random_unit();
-		slab_slice_fill(fixture->solution, mu_l, slice);
-		for (int j = 0; j < 500; j++) {
-			double tau = random_depth(), mu_v = 0.03 + 0.97 * random_unit(), azimuth = 2 * M_PI * random_unit();
+		enum slab_side side = i % 2 ? SLAB_REFLECTED : SLAB_TRANSMITTED;
+		slab_slice_fill(fixture->solution, side, mu_l, ratio, slice);
+		for (int j = 0; j < 250; j++) {
+			double tau = random_depth() * (j % 10 ? 1 : 20), mu_v = 0.03 + 0.97 * random_unit(),
+			       azimuth = 2 * M_PI * random_unit();
 			int band = j % BAND_COUNT;
-			enum slab_side side = j % 2 ? SLAB_REFLECTED : SLAB_TRANSMITTED;
-			double table = slab_slice_radiance(fixture->solution, slice, band, side, tau, mu_v, azimuth);
+			double table = slab_slice_radiance(fixture->solution, slice, band, tau, mu_v, azimuth);
+			tau *= ratio[band];
 			double exact = slab_radiance_multiple(fixture->solution, band, side, tau, mu_l, mu_v, azimuth);
 			double single = slab_radiance_single(fixture->solution, fixture->optics, band, side, tau, mu_l, mu_v, azimuth);
 			double error = fabs(table - exact) / (exact + single);
@@ -377,6 +380,27 @@ static void slices(void **state)
 	print_message("slices: rms %.3f %%, worst %.2f %%\n", 100 * sqrt(square / count), 100 * worst);
 	assert_near(sqrt(square / count), 0, 0.005, "rms");
 	assert_near(worst, 0, 0.04, "worst");
+}
+
+/* Fluxes in a row, and the albedo alone, against one by one. */
+static void flux_rows(void **state)
+{
+	struct fixture *fixture = *state;
+	const double tau[] = {0, 1e-4, 0.02, 0.7, 9, 140, 551, 3000, 1e6};
+	enum { COUNT = sizeof tau / sizeof *tau };
+	for (int i = 0; i < 20; i++) {
+		struct slab_flux row[COUNT];
+		double mu = i / 19.0;
+		slab_flux_row(fixture->solution, i % BAND_COUNT, mu, tau, COUNT, row);
+		for (int k = 0; k < COUNT; k++) {
+			struct slab_flux one = slab_flux_at(fixture->solution, i % BAND_COUNT, tau[k], mu);
+			assert_near(row[k].reflected, one.reflected, 1e-12, "R in a row");
+			assert_near(row[k].transmitted, one.transmitted, 1e-12, "T in a row");
+			assert_near(row[k].reflected + row[k].transmitted, 1, 1e-3, "R + T");
+			assert_near(slab_spherical_albedo(fixture->solution, i % BAND_COUNT, tau[k]),
+				    slab_flux_spherical(fixture->solution, i % BAND_COUNT, tau[k]).reflected, 1e-12, "spherical albedo");
+		}
+	}
 }
 
 static void threads_agree(void **state)
@@ -430,6 +454,7 @@ int main(void)
 		cmocka_unit_test(extremes),
 		cmocka_unit_test(any_droplets),
 		cmocka_unit_test(slices),
+		cmocka_unit_test(flux_rows),
 		cmocka_unit_test(threads_agree),
 	};
 	return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -22,11 +22,11 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 
 # Debian packages: to build and run, and to test. scripts/packages.sh installs those that are missing.
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
-	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
+	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml clang-format procps
 
 pkg = $(shell pkg-config $(1) $(2))
-RENDERER_LIBS = $(call pkg,--libs,epoxy cminpack) -lEGL -lm
+RENDERER_LIBS = $(call pkg,--libs,epoxy libxxhash cminpack) -lEGL -lm
 SERVER_LIBS = $(call pkg,--libs,libmicrohttpd jansson nettle) -lnova -ldl
 CLIENT_LIBS = $(call pkg,--libs,libcurl jansson)
 
@@ -52,7 +52,7 @@ programs: $(PROGRAMS) $(B)/stratus-image.so
 # The Mie kernel table does not depend on sanitizers: always made by the plain program, anew when what it says has changed.
 kernel: build/mie.kernel
 MIE_SRC := $(wildcard renderer/optics/mie*.c renderer/optics/kernel*.c) renderer/optics/quadrature.c
-KERNEL_SRC := renderer/programs/kernel.c $(MIE_SRC) renderer/log.c
+KERNEL_SRC := renderer/programs/kernel.c $(MIE_SRC) renderer/file_replace.c renderer/log.c
 ifeq ($(SAN),)
 build/mie.kernel: $(MIE_SRC) renderer/optics/kernel_table.h | build/stratus-kernel
 	build/stratus-kernel -o $@
@@ -90,8 +90,18 @@ $(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
 
 $(B)/renderer/optics/paper_fit_solve.c.o: CFLAGS += $(call pkg,--cflags,cminpack)
 
-# The Mie loops are the one place where the compiler's best vector code is worth asking for.
-$(B)/renderer/optics/%.c.o: OPT := -O3 -g -ffp-contract=fast
+# The optics are the one place where the compiler's best vector code is worth asking for.
+OPTICS_OPT := -O3 -g -ffp-contract=fast
+$(B)/renderer/optics/%.c.o: OPT := $(OPTICS_OPT)
+
+# Files of what the optics computed say by which sources, compiler, flags and solver.
+OPTICS_TEXT := $(wildcard renderer/optics/*.[ch]) Makefile
+$(B)/gen/optics_digest.h: OPT := $(OPTICS_OPT)
+$(B)/gen/optics_digest.h: $(OPTICS_TEXT)
+	@mkdir -p $(@D)
+	@{ $(CC) --version; echo '$(CFLAGS)' $(call pkg,--modversion,cminpack); cat $(filter-out Makefile,$^); } | sha256sum | sed 's/^\(.\{32\}\).*/#define OPTICS_DIGEST "\1"/' >$@
+$(B)/renderer/optics/droplet_file.c.o: CPPFLAGS += -I$(B)/gen
+$(B)/renderer/optics/droplet_file.c.o: $(B)/gen/optics_digest.h
 
 # Shaders and resources are embedded unchanged; the table maps names to bytes (renderer/embed.h).
 $(B)/gen/shaders.S: $(SHADERS) scripts/embed.sh

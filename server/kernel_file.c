@@ -1,29 +1,13 @@
 #include "server/kernel_file.h"
 
+#include "renderer/file_replace.h"
 #include "renderer/log.h"
 
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
-
-/* mkdir -p */
-static bool make_directories(const char *path)
-{
-	char part[PATH_MAX];
-	if (snprintf(part, sizeof part, "%s", path) >= (int)sizeof part)
-		return false;
-	for (char *c = part + 1; *c; c++) {
-		if (*c != '/')
-			continue;
-		*c = '\0';
-		mkdir(part, 0755);
-		*c = '/';
-	}
-	return mkdir(part, 0755) == 0 || errno == EEXIST;
-}
 
 /* Known before the table is computed rather than after. */
 static bool can_write(const char *directory)
@@ -69,7 +53,7 @@ struct kernel *kernel_file_open(const char *path, const char *state_dir)
 	if (kernel)
 		return kernel;
 
-	if (!make_directories(state_dir) || snprintf(buffer, sizeof buffer, "%s/mie.kernel", state_dir) >= (int)sizeof buffer) {
+	if (!file_make_directories(state_dir) || snprintf(buffer, sizeof buffer, "%s/mie.kernel", state_dir) >= (int)sizeof buffer) {
 		log_error("state directory %s: %s", state_dir, strerror(errno));
 		return NULL;
 	}

@@ -2,6 +2,7 @@
  * The file is made by the machine that uses it, so foreign byte orders are refused rather than converted. */
 #include "renderer/optics/kernel_table.h"
 
+#include "renderer/file_replace.h"
 #include "renderer/log.h"
 
 #include <errno.h>
@@ -9,8 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 const double band_wavelength_nm[BAND_COUNT] = {650, 550, 450};
 const double band_refractive_index[BAND_COUNT] = {1.331, 1.333, 1.337};
@@ -120,49 +119,12 @@ unsigned long long kernel_hash(const struct kernel *kernel)
 	return kernel->hash;
 }
 
-static bool write_all(int fd, const void *data, size_t size)
-{
-	const char *byte = data;
-	while (size > 0) {
-		ssize_t written = write(fd, byte, size);
-		if (written < 0 && errno != EINTR)
-			return false;
-		if (written > 0) {
-			byte += written;
-			size -= (size_t)written;
-		}
-	}
-	return true;
-}
-
 bool kernel_save(const struct kernel_payload *payload, const char *path)
 {
 	struct kernel_header header = header_of(payload);
-	size_t size = strlen(path) + sizeof ".XXXXXX";
-	char *temporary = malloc(size);
-	if (!temporary) {
-		log_error("kernel table %s: out of memory", path);
-		return false;
-	}
-	snprintf(temporary, size, "%s.XXXXXX", path);
-	int fd = mkstemp(temporary);
-	/* mkstemp makes the file private; the table is not secret and may be read by a daemon under another user. */
-	bool ok = fd >= 0 && fchmod(fd, 0644) == 0 && write_all(fd, &header, sizeof header) && write_all(fd, payload, sizeof *payload) &&
-		  fsync(fd) == 0;
-	int error = errno;
-	if (fd >= 0 && close(fd) != 0 && ok) {
-		ok = false;
-		error = errno;
-	}
-	if (ok && rename(temporary, path) != 0) {
-		ok = false;
-		error = errno;
-	}
-	if (!ok) {
-		log_error("kernel table %s: %s", path, strerror(error));
-		if (fd >= 0)
-			unlink(temporary);
-	}
-	free(temporary);
-	return ok;
+	const struct iovec parts[] = {{&header, sizeof header}, {(void *)payload, sizeof *payload}};
+	if (file_replace(path, parts, 2))
+		return true;
+	log_error("kernel table %s: %s", path, strerror(errno));
+	return false;
 }

@@ -1,19 +1,11 @@
-#include "renderer/optics/kernel_table.h"
+#include "renderer/optics/optics_storage.h"
 
 #include "renderer/log.h"
-#include "renderer/optics/moments.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Everything in one piece of memory; `optics` is first, so that its address is the piece's. */
-struct storage {
-	struct optics optics;
-	double angle[KERNEL_ANGLE_COUNT], weight[KERNEL_ANGLE_COUNT];
-	double phase[BAND_COUNT][KERNEL_ANGLE_COUNT], phase2[BAND_COUNT][KERNEL_ANGLE_COUNT];
-	double moment[BAND_COUNT][MOMENT_COUNT], moment_forward[BAND_COUNT][MOMENT_COUNT], moment_modified[BAND_COUNT][MOMENT_COUNT];
-};
 
 /* Largest differences between the angular quadrature and the series that rounding and the angles explain. */
 #define NORM_TOLERANCE      1e-3
@@ -22,7 +14,7 @@ struct storage {
 /* P_2 is positive everywhere; what is left of its truncated series must not bring it to 0, since its logarithm is interpolated. */
 #define PHASE2_MIN 1e-6
 
-static void link_storage(struct storage *storage)
+void optics_storage_link(struct optics_storage *storage)
 {
 	struct optics *optics = &storage->optics;
 	optics->angle_count = KERNEL_ANGLE_COUNT;
@@ -128,32 +120,39 @@ static bool fill_moments(struct optics *optics)
 	return ok;
 }
 
-struct optics *optics_create(const struct kernel *kernel, const struct scene_dsd *dsd, enum optics_model model)
+bool optics_storage_fill(struct optics_storage *storage, const struct kernel *kernel, const struct scene_dsd *dsd, enum optics_model model)
 {
-	struct storage *storage = calloc(1, sizeof *storage);
-	if (!storage) {
-		log_error("optics: out of memory");
-		return NULL;
-	}
 	struct optics *optics = &storage->optics;
-	link_storage(storage);
+	optics_storage_link(storage);
 	memcpy(storage->angle, kernel->payload.angle, sizeof storage->angle);
 	memcpy(storage->weight, kernel->payload.weight, sizeof storage->weight);
-	bool ok = true;
-	for (int band = 0; band < BAND_COUNT && ok; band++)
-		ok = weigh_band(&kernel->payload, dsd, band, optics);
-	ok = ok && fill_moments(optics);
-	if (!ok) {
-		free(storage);
-		return NULL;
-	}
+	for (int band = 0; band < BAND_COUNT; band++)
+		if (!weigh_band(&kernel->payload, dsd, band, optics))
+			return false;
+	if (!fill_moments(optics))
+		return false;
 	if (model == OPTICS_PAPER) {
 		/* Section 3 of the paper: kappa = N0 pi re^2 for all wavelengths. */
 		double re_m = 1e-6 * dsd->effective_radius_um;
 		for (int band = 0; band < BAND_COUNT; band++)
 			optics->extinction_per_m[band] = 1e6 * dsd->n0_per_cm3 * M_PI * re_m * re_m;
 	}
-	return optics;
+	return true;
+}
+
+_Static_assert(offsetof(struct optics_storage, optics) == 0, "optics_destroy frees all");
+
+struct optics *optics_create(const struct kernel *kernel, const struct scene_dsd *dsd, enum optics_model model)
+{
+	struct optics_storage *storage = calloc(1, sizeof *storage);
+	if (!storage) {
+		log_error("optics: out of memory");
+		return NULL;
+	}
+	if (optics_storage_fill(storage, kernel, dsd, model))
+		return &storage->optics;
+	free(storage);
+	return NULL;
 }
 
 void optics_destroy(struct optics *optics)

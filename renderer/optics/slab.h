@@ -59,9 +59,11 @@ struct slab_solution {
 };
 
 /* Solves the three bands on `threads` threads (1..16, the caller's included), 70 ms on two with AVX-512, 130 without vectors wider
- * than SSE2. NULL (and a log line) when out of memory
+ * than SSE2. Last bits depend on the processor's vectors, not on the number of threads. NULL (and a log line) when out of memory
  * or when a band does not come out finite. Any thread; ended by slab_destroy. */
 struct slab_solution *slab_solve(const struct optics *optics, int threads);
+/* slab_solve in memory of the caller's, whatever is in it. false (and a log line) when a band does not come out finite. */
+bool slab_solve_into(const struct optics *optics, int threads, struct slab_solution *solution);
 void slab_destroy(struct slab_solution *solution);
 
 /* --- radiance; any thread ------------------------------------------------------------------------------------------------------ */

@@ -214,15 +214,29 @@ __attribute__((target("avx512f,prefer-vector-width=512"))) static bool double_51
 }
 #endif
 
-static bool double_matrices(struct slab_layer *layer)
+int layer_vector_bytes(void)
 {
 #ifdef __x86_64__
 	if (__builtin_cpu_supports("avx512f"))
-		return double_512(layer);
+		return 64;
 	if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+		return 32;
+#endif
+	return 16;
+}
+
+static bool double_matrices(struct slab_layer *layer)
+{
+	switch (layer_vector_bytes()) {
+#ifdef __x86_64__
+	case 64:
+		return double_512(layer);
+	case 32:
 		return double_256(layer);
 #endif
-	return double_128(layer);
+	default:
+		return double_128(layer);
+	}
 }
 
 static void set_depth(struct slab_layer *layer, const struct layer_nodes *nodes, double depth)

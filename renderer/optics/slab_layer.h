@@ -58,6 +58,9 @@ void layer_start(struct slab_layer *layer, const struct layer_nodes *nodes, cons
  * 1 - R R is not positive, which no conservative or absorbing layer does. */
 bool layer_double(struct slab_layer *layer, const struct layer_nodes *nodes);
 
+/* Of the vectors that this processor doubles layers with, on which the last bits depend: 16, 32 or 64. */
+int layer_vector_bytes(void);
+
 /* Largest element of t and t_in. */
 double layer_transmits(const struct slab_layer *layer);
 

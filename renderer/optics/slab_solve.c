@@ -51,6 +51,7 @@ static void truncate_moments(struct job *job, int band)
 	const double *moment = job->optics->moment[band];
 	double f = fmin(fmax(moment[LAYER_MOMENTS], 0), 0.9);
 	job->solution->band[band].truncated = f;
+	job->solution->band[band].asymmetry = 0;
 	for (int l = 0; l < LAYER_MOMENTS; l++)
 		job->moment[band][l] = (moment[l] - f) / (1 - f);
 }
@@ -172,13 +173,9 @@ static bool all_finite(const struct slab_band *band)
 	return sum == 0 && isfinite(band->extrapolation);
 }
 
-struct slab_solution *slab_solve(const struct optics *optics, int threads)
+bool slab_solve_into(const struct optics *optics, int threads, struct slab_solution *solution)
 {
-	struct job job = {.optics = optics, .solution = calloc(1, sizeof *job.solution)};
-	if (!job.solution) {
-		log_error("slab: out of memory");
-		return NULL;
-	}
+	struct job job = {.optics = optics, .solution = solution};
 	layer_nodes_fill(&job.nodes);
 	memcpy(job.solution->mu, job.nodes.output_mu, sizeof job.solution->mu);
 	memcpy(job.solution->weight, job.nodes.output_weight, sizeof job.solution->weight);
@@ -198,10 +195,21 @@ struct slab_solution *slab_solve(const struct optics *optics, int threads)
 		finish_band(&job, band);
 		finite = finite && all_finite(&job.solution->band[band]);
 	}
-	if (finite)
-		return job.solution;
-	log_error("slab: the solution is not finite");
-	slab_destroy(job.solution);
+	if (!finite)
+		log_error("slab: the solution is not finite");
+	return finite;
+}
+
+struct slab_solution *slab_solve(const struct optics *optics, int threads)
+{
+	struct slab_solution *solution = malloc(sizeof *solution);
+	if (!solution) {
+		log_error("slab: out of memory");
+		return NULL;
+	}
+	if (slab_solve_into(optics, threads, solution))
+		return solution;
+	slab_destroy(solution);
 	return NULL;
 }
 

@@ -6,6 +6,7 @@
 
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 /* So many failures on end are taken for a dead context rather than for bad luck. */
@@ -16,8 +17,9 @@ struct render_thread {
 	struct render_queue *queue;
 	pthread_t thread;
 	struct kernel *kernel;
+	struct droplet_store *droplets;
 	struct renderer *renderer;
-	_Atomic int state; /* enum render_thread_state; kernel and renderer are set before it says READY */
+	_Atomic int state; /* enum render_thread_state; kernel, droplets and renderer are set before it says READY */
 	_Atomic double busy_since_ms, typical_ms;
 	int failures; /* on end */
 };
@@ -68,11 +70,21 @@ static void run_jobs(struct render_thread *thread)
 	}
 }
 
+static bool open_droplets(struct render_thread *thread)
+{
+	char directory[4096];
+	int length = snprintf(directory, sizeof directory, "%s/droplets", thread->config->state_dir);
+	bool fits = length > 0 && (size_t)length < sizeof directory;
+	thread->droplets =
+		droplet_store_create(&(struct droplet_store_params){.kernel = thread->kernel, .directory = fits ? directory : NULL});
+	return thread->droplets != NULL;
+}
+
 static bool start(struct render_thread *thread)
 {
 	const struct config *config = thread->config;
 	thread->kernel = kernel_file_open(config->kernel, config->state_dir);
-	if (!thread->kernel)
+	if (!thread->kernel || !open_droplets(thread))
 		return false;
 	const struct renderer_params params = {
 		.device_index = config->device,
@@ -125,6 +137,7 @@ void render_thread_destroy(struct render_thread *thread)
 	if (!thread)
 		return;
 	pthread_join(thread->thread, NULL);
+	droplet_store_destroy(thread->droplets);
 	kernel_destroy(thread->kernel);
 	free(thread);
 }
@@ -142,6 +155,11 @@ const struct renderer_info *render_thread_info(const struct render_thread *threa
 const struct kernel *render_thread_kernel(const struct render_thread *thread)
 {
 	return thread->kernel;
+}
+
+struct droplet_store *render_thread_droplets(const struct render_thread *thread)
+{
+	return thread->droplets;
 }
 
 double render_thread_busy_ms(const struct render_thread *thread)

@@ -4,6 +4,7 @@
 #ifndef STRATUS_SERVER_RENDER_THREAD_H
 #define STRATUS_SERVER_RENDER_THREAD_H
 
+#include "renderer/droplet_store.h"
 #include "server/config.h"
 #include "server/render_queue.h"
 
@@ -23,6 +24,7 @@ enum render_thread_state render_thread_state(const struct render_thread *thread)
 /* Any thread, once the state has been RENDER_THREAD_READY. */
 const struct renderer_info *render_thread_info(const struct render_thread *thread);
 const struct kernel *render_thread_kernel(const struct render_thread *thread);
+struct droplet_store *render_thread_droplets(const struct render_thread *thread);
 
 /* Milliseconds the running job has taken so far, 0 when idle. Any thread. */
 double render_thread_busy_ms(const struct render_thread *thread);

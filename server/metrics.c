@@ -8,10 +8,12 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/optics", "/v1/sun", "/v1/presets", "/",
-						     "/openapi.yaml", "/healthz",   "/readyz", "/metrics",    "other"};
+static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/optics", "/v1/slab", "/v1/sun",  "/v1/presets", "/",
+						     "/openapi.yaml", "/healthz",   "/readyz",  "/metrics", "other"};
 static const char *const rejection_names[REJECTION_COUNT] = {"full", "starting", "shutting_down"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
+static const char *const source_names[DROPLET_SOURCE_COUNT] = {
+	[DROPLETS_FROM_MEMORY] = "memory", [DROPLETS_FROM_DISK] = "disk", [DROPLETS_COMPUTED] = "computed"};
 
 /* Every status that is sent; the last stands for all others. */
 static const unsigned statuses[] = {200, 304, 400, 404, 405, 406, 413, 415, 422, 499, 500, 503, 504, 0};
@@ -34,6 +36,8 @@ struct metrics {
 	unsigned long reused[TIMING_COUNT];
 	unsigned long rejected[REJECTION_COUNT];
 	unsigned long ended[END_COUNT];
+	unsigned long tracings_ended[END_COUNT];
+	double photons;
 };
 
 struct metrics *metrics_create(void)
@@ -98,6 +102,20 @@ void metrics_count_end(struct metrics *metrics, enum metrics_end end)
 {
 	pthread_mutex_lock(&metrics->mutex);
 	metrics->ended[end]++;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_photons(struct metrics *metrics, double photons)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->photons += photons;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_tracing_end(struct metrics *metrics, enum metrics_end end)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->tracings_ended[end]++;
 	pthread_mutex_unlock(&metrics->mutex);
 }
 
@@ -175,6 +193,31 @@ static void write_queue(struct text *text, const struct metrics *metrics, const 
 		text_printf(text, "stratus_renders_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->ended[i]);
 }
 
+static void write_tracings(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
+{
+	write_family(text, "tracings_waiting", "gauge", "Photon tracings waiting.");
+	text_printf(text, "stratus_tracings_waiting %zu\n", now->tracings_waiting);
+	write_family(text, "tracings_limit", "gauge", "Photon tracings that may wait.");
+	text_printf(text, "stratus_tracings_limit %zu\n", now->tracings_limit);
+	write_family(text, "photons", "counter", "Photons traced for answers, the bands together.");
+	text_printf(text, "stratus_photons_total %.0f\n", metrics->photons);
+	write_family(text, "tracings_ended", "counter", "Accepted photon tracings that brought no numbers, by reason.");
+	for (int i = 0; i < END_COUNT; i++)
+		text_printf(text, "stratus_tracings_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->tracings_ended[i]);
+}
+
+static void write_droplets(struct text *text, const struct droplet_store_counts *counts)
+{
+	write_family(text, "droplet_tables", "counter", "Uses of the tables of a droplet distribution, by where they came from.");
+	for (int i = 0; i < DROPLET_SOURCE_COUNT; i++)
+		text_printf(text, "stratus_droplet_tables_total{source=\"%s\"} %llu\n", source_names[i],
+			    (unsigned long long)counts->from[i]);
+	write_family(text, "droplet_files_damaged", "counter", "Files of such tables that were damaged or foreign, and computed anew.");
+	text_printf(text, "stratus_droplet_files_damaged_total %llu\n", (unsigned long long)counts->damaged_files);
+	write_family(text, "droplet_tables_bytes", "gauge", "Memory of such tables.");
+	text_printf(text, "stratus_droplet_tables_bytes %llu\n", (unsigned long long)counts->memory_bytes);
+}
+
 static void write_label(struct text *text, const char *name, const char *value)
 {
 	text_printf(text, "%s=\"", name);
@@ -227,6 +270,8 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_requests(&text, copy);
 	write_stages(&text, copy);
 	write_queue(&text, copy, now);
+	write_tracings(&text, copy, now);
+	write_droplets(&text, &now->droplets);
 	write_infos(&text, now->info);
 	write_process(&text);
 	text_add(&text, "# EOF\n");

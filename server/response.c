@@ -66,6 +66,8 @@ static unsigned retry_after(const struct request *request)
 	switch (request->problem.kind) {
 	case PROBLEM_QUEUE_FULL:
 		return service_retry_seconds(request->service);
+	case PROBLEM_TRACINGS_FULL:
+		return service_tracing_retry_seconds(request->service);
 	case PROBLEM_STARTING:
 		return 2;
 	case PROBLEM_SHUTTING_DOWN:

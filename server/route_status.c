@@ -36,12 +36,16 @@ enum MHD_Result route_readyz(struct request *request)
 enum MHD_Result route_metrics(struct request *request)
 {
 	struct service *service = request->service;
-	const struct metrics_now now = {
+	struct metrics_now now = {
 		.info = service->ready ? render_thread_info(service->render_thread) : NULL,
 		.queue_depth = render_queue_depth(service->queue),
 		.queue_limit = (size_t)service->config->queue_length,
 		.requests_in_flight = service->in_flight,
+		.tracings_waiting = worker_pool_waiting(service->tracers),
+		.tracings_limit = SERVICE_TRACINGS_MAX,
 	};
+	if (service->ready)
+		now.droplets = droplet_store_counts(render_thread_droplets(service->render_thread));
 	return response_send_document(request, metrics_format(service->metrics, &now),
 				      "application/openmetrics-text; version=1.0.0; charset=utf-8", CACHE_NONE);
 }

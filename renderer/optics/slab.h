@@ -66,6 +66,9 @@ struct slab_solution *slab_solve(const struct optics *optics, int threads);
 bool slab_solve_into(const struct optics *optics, int threads, struct slab_solution *solution);
 void slab_destroy(struct slab_solution *solution);
 
+/* Of the vectors that this processor solves with: 16, 32 or 64. */
+int slab_vector_bytes(void);
+
 /* --- radiance; any thread ------------------------------------------------------------------------------------------------------ */
 
 /* All orders but the unscattered beam, >= 0. optics: those that were solved. */

@@ -17,7 +17,7 @@
 #define HANG_MS 300000.0
 
 /* Tracing photons takes what rendering and encoding leave. */
-enum { TRACER_NICE = 15 };
+enum { TRACER_NICE = 10 };
 
 static size_t worker_count(const struct config *config)
 {

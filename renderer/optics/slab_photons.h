@@ -14,7 +14,7 @@
  * times that. What few photons contribute to is skewed: where the error is above some 10 %, as may be at the horizon itself, it is a rough
  * one.
  *
- * Time: a thick layer scatters a photon 6/7 (1 + 2 mu_l) tau times on average (diffusion; a few times less in thin ones), at 15 to 25
+ * Time: a thick layer scatters a photon 6/7 (1 + 2 mu_l) tau times on average (diffusion; half to one and a half of that at tau 8), at 15 to 25
  * million scatterings per second and processor. The longest ways end exponentially, by a factor e per 0.3 (1-g) (tau + 1.4/(1-g))^2
  * scatterings, so that every photon comes to its end. Radiance costs 0.1 us per photon and view and 5 ns per estimate, and nothing deep
  * inside thick layers.

@@ -6,6 +6,7 @@
 #ifndef STRATUS_RENDERER_RENDERER_H
 #define STRATUS_RENDERER_RENDERER_H
 
+#include "renderer/droplet_store.h"
 #include "renderer/optics/optics.h"
 #include "renderer/scene.h"
 
@@ -17,12 +18,13 @@
 enum pass_kind { PASS_AUTO, PASS_FRAGMENT, PASS_COMPUTE };
 
 struct renderer_params {
-	int device_index;            /* EGL device, from 0; negative: the first hardware device, else software */
-	bool require_gpu;            /* refuse software rendering */
-	enum pass_kind pass_kind;    /* how full-screen passes run; PASS_AUTO measures at start */
-	const char *shader_dir;      /* read shaders from here instead of the embedded ones; NULL: embedded */
-	const struct kernel *kernel; /* Mie kernel table; must outlive the renderer */
-	size_t cache_bytes;          /* bound of what the stages remember on the GPU; 0: 256 MiB */
+	int device_index;               /* EGL device, from 0; negative: the first hardware device, else software */
+	bool require_gpu;               /* refuse software rendering */
+	enum pass_kind pass_kind;       /* how full-screen passes run; PASS_AUTO measures at start */
+	const char *shader_dir;         /* read shaders from here instead of the embedded ones; NULL: embedded */
+	const struct kernel *kernel;    /* Mie kernel table; must outlive the renderer */
+	struct droplet_store *droplets; /* their tables; must outlive the renderer */
+	size_t cache_bytes;             /* bound of what the stages remember on the GPU; 0: 256 MiB */
 };
 
 struct renderer_info {

@@ -50,6 +50,10 @@ static const struct option options[] = {
 	 OPTION_INTEGER, AT(timeout_ms), .low = 1, .high = 3600000},
 	{"--cache-mb", "STRATUS_CACHE_MB", "MB", "memory of the renderer's stages on the GPU",
 	 OPTION_INTEGER, AT(cache_mb), .low = 1, .high = 1048576},
+	{"--droplets-mb", "STRATUS_DROPLETS_MB", "MB", "memory of droplet tables, 16 MB for each distribution",
+	 OPTION_INTEGER, AT(droplets_mb), .low = 16, .high = 1048576},
+	{"--droplets-disk-mb", "STRATUS_DROPLETS_DISK_MB", "MB", "disk space of droplet tables in the state directory; 0: none",
+	 OPTION_INTEGER, AT(droplets_disk_mb), .low = 0, .high = 16777216},
 	{"--log-level", "STRATUS_LOG_LEVEL", "LEVEL", "error, warning, info, debug",
 	 OPTION_CHOICE, AT(log_level), .choices = level_names},
 	{0},
@@ -179,6 +183,8 @@ static void set_defaults(struct config *config)
 		.queue_length = 64,
 		.timeout_ms = 30000,
 		.cache_mb = 256,
+		.droplets_mb = 256,
+		.droplets_disk_mb = 1024,
 		.log_level = LOG_INFO,
 	};
 	if (state && *state == '/')

@@ -12,12 +12,14 @@ struct config {
 	const char *image_module; /* NULL: beside the program */
 	int device;               /* EGL device; -1: the first hardware device, else software */
 	bool require_gpu;
-	int pass_kind;    /* enum pass_kind */
-	int queue_length; /* 1..65536 */
-	int workers;      /* 1..256; 0: as many as processors */
-	int timeout_ms;   /* 1..3600000, when a request says none */
-	int cache_mb;     /* 1..1048576 */
-	int log_level;    /* enum log_level */
+	int pass_kind;        /* enum pass_kind */
+	int queue_length;     /* 1..65536 */
+	int workers;          /* 1..256; 0: as many as processors */
+	int timeout_ms;       /* 1..3600000, when a request says none */
+	int cache_mb;         /* 1..1048576 */
+	int droplets_mb;      /* 16..1048576 */
+	int droplets_disk_mb; /* 0..16777216; 0: nothing is kept on disk */
+	int log_level;        /* enum log_level */
 
 	char state_dir_buffer[4096]; /* holds the default of state_dir */
 };

@@ -179,9 +179,9 @@ static void write_stages(struct text *text, const struct metrics *metrics)
 
 static void write_queue(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
 {
-	write_family(text, "queue_depth", "gauge", "Renders waiting.");
+	write_family(text, "queue_depth", "gauge", "Renders waiting, for their droplets or for the renderer.");
 	text_printf(text, "stratus_queue_depth %zu\n", now->queue_depth);
-	write_family(text, "queue_limit", "gauge", "Renders that may wait.");
+	write_family(text, "queue_limit", "gauge", "Renders that may wait for each.");
 	text_printf(text, "stratus_queue_limit %zu\n", now->queue_limit);
 	write_family(text, "requests_in_flight", "gauge", "Requests being answered, this one included.");
 	text_printf(text, "stratus_requests_in_flight %zu\n", now->requests_in_flight);

@@ -14,6 +14,14 @@ struct render_queue {
 	bool closed;
 };
 
+bool render_job_is_over(struct render_job *job)
+{
+	bool expired = clock_now_ms() >= job->deadline_ms, over = expired || job->abandoned(job);
+	if (over)
+		job->outcome = expired ? RENDER_OUTCOME_EXPIRED : RENDER_OUTCOME_ABANDONED;
+	return over;
+}
+
 struct render_queue *render_queue_create(size_t limit)
 {
 	struct render_queue *queue = calloc(1, sizeof *queue);
@@ -37,20 +45,45 @@ void render_queue_destroy(struct render_queue *queue)
 	free(queue);
 }
 
+static void append(struct render_queue *queue, struct render_job *job)
+{
+	job->queued_ms = clock_now_ms();
+	job->next = NULL;
+	*queue->last = job;
+	queue->last = &job->next;
+	queue->depth++;
+	pthread_cond_signal(&queue->changed);
+}
+
 bool render_queue_push(struct render_queue *queue, struct render_job *job)
 {
 	pthread_mutex_lock(&queue->mutex);
 	bool accepted = !queue->closed && queue->depth < queue->limit;
-	if (accepted) {
-		job->queued_ms = clock_now_ms();
-		job->next = NULL;
-		*queue->last = job;
-		queue->last = &job->next;
-		queue->depth++;
-		pthread_cond_signal(&queue->changed);
-	}
+	if (accepted)
+		append(queue, job);
 	pthread_mutex_unlock(&queue->mutex);
 	return accepted;
+}
+
+void render_queue_pass(struct render_queue *queue, struct render_job *job)
+{
+	pthread_mutex_lock(&queue->mutex);
+	append(queue, job);
+	pthread_mutex_unlock(&queue->mutex);
+}
+
+/* Takes the job out that `link` leads to; NULL when it leads to none. */
+static struct render_job *take(struct render_queue *queue, struct render_job **link)
+{
+	struct render_job *job = *link;
+	if (!job)
+		return NULL;
+	*link = job->next;
+	if (!*link)
+		queue->last = link;
+	queue->depth--;
+	job->waited_ms += clock_now_ms() - job->queued_ms;
+	return job;
 }
 
 struct render_job *render_queue_pop(struct render_queue *queue)
@@ -58,13 +91,18 @@ struct render_job *render_queue_pop(struct render_queue *queue)
 	pthread_mutex_lock(&queue->mutex);
 	while (!queue->first && !queue->closed)
 		pthread_cond_wait(&queue->changed, &queue->mutex);
-	struct render_job *job = queue->first;
-	if (job) {
-		queue->first = job->next;
-		if (!queue->first)
-			queue->last = &queue->first;
-		queue->depth--;
-	}
+	struct render_job *job = take(queue, &queue->first);
+	pthread_mutex_unlock(&queue->mutex);
+	return job;
+}
+
+struct render_job *render_queue_pop_wanted(struct render_queue *queue, render_job_wanted *wanted, void *context)
+{
+	pthread_mutex_lock(&queue->mutex);
+	struct render_job **link = &queue->first;
+	while (*link && !wanted(*link, context))
+		link = &(*link)->next;
+	struct render_job *job = take(queue, link);
 	pthread_mutex_unlock(&queue->mutex);
 	return job;
 }

@@ -1,4 +1,4 @@
-/* Bounded queue of render jobs, from the HTTP threads to the render thread. Any thread.
+/* Bounded queue of render jobs, from the HTTP threads to the render thread, or to the thread that prepares for it. Any thread.
  *
  * A full queue refuses: overload is an answer (503), not a wait. Jobs leave in the order they came. Once closed the queue takes nothing
  * more, and still gives out what it holds.
@@ -22,16 +22,24 @@ struct render_job {
 	double deadline_ms; /* on the clock of clock.h */
 	double queued_ms;   /* likewise, set by render_queue_push */
 
-	/* Asked by the render thread at dequeue and between passes: does nobody wait any more? */
+	/* Asked at dequeue and between passes: does nobody wait any more? */
 	bool (*abandoned)(struct render_job *job);
-	/* Called once by the render thread, with the outcome set; the job may be gone when it returns. */
+	/* Called once, by the thread that ends the job, with the outcome set; the job may be gone when it returns. */
 	void (*finished)(struct render_job *job);
 
+	/* What was prepared (server/preparation.h), held until the job's owner releases it: else it might be gone when it is needed. */
+	const struct droplet_tables *droplets;
+	double prepared_ms;
+	bool prepared; /* computed or read from disk; else from memory */
+
 	enum render_outcome outcome;
-	double waited_ms; /* in the queue */
+	double waited_ms; /* in queues */
 	struct frame frame;
 	struct render_job *next; /* of the queue */
 };
+
+/* Is there no use in going on with a job, since its deadline passed or nobody waits? Its outcome then says so. */
+bool render_job_is_over(struct render_job *job);
 
 struct render_queue;
 
@@ -42,8 +50,15 @@ void render_queue_destroy(struct render_queue *queue);
 /* false when full or closed; the job then stays with the caller. */
 bool render_queue_push(struct render_queue *queue, struct render_job *job);
 
+/* Takes a job whatever the limit and even when closed: it was admitted to another queue before. */
+void render_queue_pass(struct render_queue *queue, struct render_job *job);
+
 /* Waits for a job. NULL once the queue is closed and empty. */
 struct render_job *render_queue_pop(struct render_queue *queue);
+
+/* The first job that is wanted, or NULL; never waits. `wanted` must not use the queue. */
+typedef bool render_job_wanted(struct render_job *job, void *context);
+struct render_job *render_queue_pop_wanted(struct render_queue *queue, render_job_wanted *wanted, void *context);
 
 void render_queue_close(struct render_queue *queue);
 

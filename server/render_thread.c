@@ -4,6 +4,7 @@
 #include "server/clock.h"
 #include "server/kernel_file.h"
 
+#include <limits.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -24,26 +25,18 @@ struct render_thread {
 	int failures; /* on end */
 };
 
-static bool is_expired(const struct render_job *job)
-{
-	return clock_now_ms() >= job->deadline_ms;
-}
-
 static bool is_cancelled(void *context)
 {
-	struct render_job *job = context;
-	return is_expired(job) || job->abandoned(job);
+	return render_job_is_over(context);
 }
 
 static enum render_outcome render(struct render_thread *thread, struct render_job *job)
 {
-	if (is_expired(job))
-		return RENDER_OUTCOME_EXPIRED;
-	if (job->abandoned(job))
-		return RENDER_OUTCOME_ABANDONED;
+	if (render_job_is_over(job))
+		return job->outcome;
 	enum render_result result = renderer_render(thread->renderer, job->scene, is_cancelled, job, &job->frame);
 	if (result == RENDER_CANCELLED)
-		return is_expired(job) ? RENDER_OUTCOME_EXPIRED : RENDER_OUTCOME_ABANDONED;
+		return job->outcome;
 	/* A scene that does not fit says nothing about the next one: only a failing device turns the daemon's health. */
 	if (result == RENDER_OUT_OF_MEMORY)
 		return RENDER_OUTCOME_NO_MEMORY;
@@ -60,7 +53,6 @@ static void run_jobs(struct render_thread *thread)
 	for (struct render_job *job; (job = render_queue_pop(thread->queue));) {
 		double start = clock_now_ms();
 		thread->busy_since_ms = start;
-		job->waited_ms = start - job->queued_ms;
 		job->outcome = render(thread, job);
 		double took = clock_now_ms() - start;
 		if (job->outcome == RENDER_OUTCOME_OK)
@@ -72,11 +64,16 @@ static void run_jobs(struct render_thread *thread)
 
 static bool open_droplets(struct render_thread *thread)
 {
-	char directory[4096];
-	int length = snprintf(directory, sizeof directory, "%s/droplets", thread->config->state_dir);
-	bool fits = length > 0 && (size_t)length < sizeof directory;
-	thread->droplets =
-		droplet_store_create(&(struct droplet_store_params){.kernel = thread->kernel, .directory = fits ? directory : NULL});
+	const struct config *config = thread->config;
+	char directory[PATH_MAX];
+	struct droplet_store_params params = {.kernel = thread->kernel,
+					      .memory_bytes = (size_t)config->droplets_mb << 20,
+					      .disk_bytes = (uint64_t)config->droplets_disk_mb << 20};
+	if (snprintf(directory, sizeof directory, "%s/droplets", config->state_dir) >= (int)sizeof directory)
+		log_warning("state directory %s: its name is too long to keep droplets in it", config->state_dir);
+	else if (config->droplets_disk_mb > 0)
+		params.directory = directory;
+	thread->droplets = droplet_store_create(&params);
 	return thread->droplets != NULL;
 }
 
@@ -92,6 +89,7 @@ static bool start(struct render_thread *thread)
 		.pass_kind = (enum pass_kind)config->pass_kind,
 		.shader_dir = config->shader_dir,
 		.kernel = thread->kernel,
+		.droplets = thread->droplets,
 		.cache_bytes = (size_t)config->cache_mb << 20,
 	};
 	thread->renderer = renderer_create(&params);

@@ -1,5 +1,5 @@
-/* The one thread that owns the renderer and with it the OpenGL context. It loads the kernel table, brings the renderer up, then takes jobs
- * from the queue until that is closed and empty.
+/* The one thread that owns the renderer and with it the OpenGL context. It loads the kernel table, opens the droplet tables, brings
+ * the renderer up, then takes jobs from the queue until that is closed and empty.
  */
 #ifndef STRATUS_SERVER_RENDER_THREAD_H
 #define STRATUS_SERVER_RENDER_THREAD_H
@@ -15,7 +15,7 @@ struct render_thread;
 /* Both arguments must outlive the thread. NULL (and a log line) on failure. */
 struct render_thread *render_thread_create(const struct config *config, struct render_queue *queue);
 
-/* Close the queue first: waits until every job in it is done. Takes NULL. */
+/* Close the queue first: waits until every job in it is done. All droplet tables must have been released. Takes NULL. */
 void render_thread_destroy(struct render_thread *thread);
 
 /* Any thread. RENDER_THREAD_FAILED: it did not come up (the log says why), or fails job after job. */

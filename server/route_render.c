@@ -1,7 +1,8 @@
 /* /v1/render: a scene in, an image out.
  *
- * The HTTP thread reads and checks the scene and answers what needs no rendering; then the request is suspended and goes from the queue to
- * the render thread, from there to a worker that encodes, and back to the HTTP thread with its image.
+ * The HTTP thread reads and checks the scene and answers what needs no rendering; then the request is suspended and goes, past the thread
+ * that prepares its droplets where they are new, from the queue to the render thread, from there to a worker that encodes, and back to the
+ * HTTP thread with its image.
  */
 #include "server/routes.h"
 
@@ -159,6 +160,7 @@ static enum MHD_Result finish(struct request *request)
 		break;
 	}
 	timings_set_frame(&request->timings, &work->job.frame);
+	timings_add_optics(&request->timings, work->job.prepared_ms, work->job.prepared);
 	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
 	struct MHD_Response *response = response_create((char *)work->image.data, work->image.size);
 	work->image.data = NULL;
@@ -212,6 +214,7 @@ static void encode(struct work *base)
 static void on_rendered(struct render_job *job)
 {
 	struct render_work *work = (struct render_work *)((char *)job - offsetof(struct render_work, job));
+	preparation_release(work->request->service->preparation, job);
 	if (job->outcome == RENDER_OUTCOME_FAILED)
 		log_error("request %s: rendering failed", work->request->id);
 	if (job->outcome == RENDER_OUTCOME_OK)
@@ -225,15 +228,14 @@ static void on_rendered(struct render_job *job)
 static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 {
 	struct render_work *work = request->work;
-	struct render_queue *queue = request->service->queue;
 	work->job.scene = &work->input.scene;
 	work->job.deadline_ms = deadline_ms;
 	work->job.abandoned = is_abandoned;
 	work->job.finished = on_rendered;
 	work->encode.run = encode;
-	/* Suspended first: the render thread may be done before render_queue_push returns. */
+	/* Suspended first: the render thread may be done before preparation_push returns. */
 	request_suspend(request, finish);
-	if (!render_queue_push(queue, &work->job)) {
+	if (!preparation_push(request->service->preparation, &work->job)) {
 		work->refused = true;
 		request_resume(request);
 	}

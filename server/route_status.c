@@ -25,7 +25,7 @@ enum MHD_Result route_readyz(struct request *request)
 		const struct renderer_info *info = render_thread_info(service->render_thread);
 		json_t *details = json_pack("{s:s, s:s, s:s, s:s, s:b, s:s, s:I, s:i}", "vendor", info->vendor, "renderer", info->renderer,
 					    "version", info->version, "platform", info->platform, "software", info->software, "pass",
-					    pass_names[info->pass_kind], "queue_depth", (json_int_t)render_queue_depth(service->queue),
+					    pass_names[info->pass_kind], "queue_depth", (json_int_t)service_queue_depth(service),
 					    "max_texture_size", info->max_texture_size);
 		json_object_update(answer, details);
 		json_decref(details);
@@ -38,7 +38,7 @@ enum MHD_Result route_metrics(struct request *request)
 	struct service *service = request->service;
 	struct metrics_now now = {
 		.info = service->ready ? render_thread_info(service->render_thread) : NULL,
-		.queue_depth = render_queue_depth(service->queue),
+		.queue_depth = service_queue_depth(service),
 		.queue_limit = (size_t)service->config->queue_length,
 		.requests_in_flight = service->in_flight,
 		.tracings_waiting = worker_pool_waiting(service->tracers),

@@ -24,6 +24,12 @@ void timings_set_frame(struct timings *timings, const struct frame *frame)
 	timings->radiosity_residual = frame->radiosity_residual;
 }
 
+void timings_add_optics(struct timings *timings, double milliseconds, bool computed)
+{
+	timings->entry[TIMING_OPTICS].milliseconds += milliseconds;
+	timings->entry[TIMING_OPTICS].reused &= !computed;
+}
+
 void timings_format(const struct timings *timings, char text[static SERVER_TIMING_SIZE])
 {
 	size_t used = 0;

@@ -37,6 +37,9 @@ void timings_set(struct timings *timings, enum timing timing, double millisecond
 /* Takes over the stages of a rendered frame. */
 void timings_set_frame(struct timings *timings, const struct frame *frame);
 
+/* Adds what was spent on the optics before; `computed`: they did not come from memory. */
+void timings_add_optics(struct timings *timings, double milliseconds, bool computed);
+
 /* The header's value: what was measured, in the order above. */
 void timings_format(const struct timings *timings, char text[static SERVER_TIMING_SIZE]);
 

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* A render longer than this is a hang that a restart cures. */
+/* A render, or what it needs, longer than this is a hang that a restart cures. */
 #define HANG_MS 300000.0
 
 /* Tracing photons takes what rendering and encoding leave. */
@@ -86,16 +86,25 @@ struct service *service_create(const struct config *config)
 	return NULL;
 }
 
+/* What needs the renderer; tried again when there was no memory. */
+static bool finish_start(struct service *service)
+{
+	if (!service->pixel_version)
+		service->pixel_version = pixel_version(service);
+	if (!service->preparation)
+		service->preparation = preparation_create(render_thread_droplets(service->render_thread), service->queue,
+							  (size_t)service->config->queue_length);
+	return service->pixel_version && service->preparation;
+}
+
 enum service_state service_wait(struct service *service, int milliseconds)
 {
 	double until = clock_now_ms() + milliseconds;
 	enum render_thread_state state;
 	while ((state = render_thread_state(service->render_thread)) == RENDER_THREAD_STARTING && clock_now_ms() < until)
 		usleep(5000);
-	if (state == RENDER_THREAD_READY && !service->ready) {
-		service->pixel_version = pixel_version(service);
-		service->ready = service->pixel_version != NULL;
-	}
+	if (state == RENDER_THREAD_READY && !service->ready)
+		service->ready = finish_start(service);
 	return service_state(service);
 }
 
@@ -130,6 +139,7 @@ void service_destroy(struct service *service)
 	drain(service);
 	await_suspended(service);
 	http_stop(service);
+	preparation_destroy(service->preparation);
 	if (service->queue)
 		render_queue_close(service->queue);
 	render_thread_destroy(service->render_thread);
@@ -147,9 +157,16 @@ enum service_state service_state(const struct service *service)
 		return SERVICE_FAILED;
 	if (service->render_thread && render_thread_busy_ms(service->render_thread) > HANG_MS)
 		return SERVICE_FAILED;
+	if (service->ready && preparation_busy_ms(service->preparation) > HANG_MS)
+		return SERVICE_FAILED;
 	if (service->stopping)
 		return SERVICE_STOPPING;
 	return service->ready ? SERVICE_READY : SERVICE_STARTING;
+}
+
+size_t service_queue_depth(const struct service *service)
+{
+	return render_queue_depth(service->queue) + (service->ready ? preparation_depth(service->preparation) : 0);
 }
 
 static unsigned whole_seconds(double milliseconds)
@@ -160,7 +177,10 @@ static unsigned whole_seconds(double milliseconds)
 
 unsigned service_retry_seconds(const struct service *service)
 {
-	return whole_seconds((double)render_queue_depth(service->queue) * render_thread_typical_ms(service->render_thread));
+	double milliseconds = (double)render_queue_depth(service->queue) * render_thread_typical_ms(service->render_thread);
+	if (service->ready)
+		milliseconds += (double)preparation_depth(service->preparation) * preparation_typical_ms(service->preparation);
+	return whole_seconds(milliseconds);
 }
 
 unsigned service_tracing_retry_seconds(const struct service *service)

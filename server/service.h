@@ -5,6 +5,7 @@
 #include "renderer/image/image.h"
 #include "server/config.h"
 #include "server/metrics.h"
+#include "server/preparation.h"
 #include "server/render_queue.h"
 #include "server/render_thread.h"
 #include "server/worker_pool.h"
@@ -29,6 +30,7 @@ struct service {
 	struct metrics *metrics;
 	struct render_queue *queue;
 	struct render_thread *_Atomic render_thread;
+	struct preparation *preparation; /* once ready */
 	struct worker_pool *workers;
 	struct worker_pool *tracers; /* one thread that traces photons, on all processors, behind everything else */
 	struct MHD_Daemon *daemon;
@@ -57,6 +59,9 @@ void service_destroy(struct service *service);
 
 /* Any thread. */
 enum service_state service_state(const struct service *service);
+
+/* Renders waiting for their droplets or for the renderer. Any thread. */
+size_t service_queue_depth(const struct service *service);
 
 /* A guess at when the queue has room again, from 1. Any thread. */
 unsigned service_retry_seconds(const struct service *service);

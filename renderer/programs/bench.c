@@ -190,7 +190,8 @@ int main(int argc, char **argv)
 	const double begin = clock_milliseconds();
 	struct kernel *kernel = kernel_load(kernel_path);
 	params.kernel = kernel;
-	struct renderer *renderer = kernel ? renderer_create(&params) : NULL;
+	params.droplets = kernel ? droplet_store_create(&(struct droplet_store_params){.kernel = kernel}) : NULL;
+	struct renderer *renderer = params.droplets ? renderer_create(&params) : NULL;
 	if (!renderer)
 		goto end;
 	printf("start %.0f ms on %s\n", clock_milliseconds() - begin, renderer_info(renderer)->renderer);
@@ -206,6 +207,7 @@ int main(int argc, char **argv)
 
 end:
 	renderer_destroy(renderer);
+	droplet_store_destroy(params.droplets);
 	kernel_destroy(kernel);
 	return status;
 }

@@ -98,6 +98,8 @@ def run(*flags, **environment):
         ["--log-level=loud"],
         ["--device", "1e3"],
         ["--workers=-1"],
+        ["--droplets-mb", "0"],
+        ["--droplets-disk-mb=-1"],
         ["stray"],
     ],
 )
@@ -125,7 +127,7 @@ def test_settings_are_printed():
 
 def test_help_and_version():
     text = run("--help").stdout
-    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb log-level".split():
+    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb droplets-mb droplets-disk-mb log-level".split():
         assert "--" + flag in text and "STRATUS_" + flag.upper().replace("-", "_") in text
     assert run("--version").stdout.startswith("stratus ")
 

@@ -24,11 +24,12 @@
 
 static struct renderer *renderer;
 static struct kernel *kernel;
+static struct droplet_store *droplets;
 
 static inline struct renderer *create_renderer(size_t cache_bytes)
 {
 	const struct renderer_params params = {
-		.device_index = -1, .pass_kind = PASS_FRAGMENT, .kernel = kernel, .cache_bytes = cache_bytes};
+		.device_index = -1, .pass_kind = PASS_FRAGMENT, .kernel = kernel, .droplets = droplets, .cache_bytes = cache_bytes};
 	return renderer_create(&params);
 }
 
@@ -40,9 +41,11 @@ static inline int run_with_renderer(const struct CMUnitTest *tests, size_t count
 	if (!kernel)
 		return 1;
 	log_set_level(LOG_ERROR);
-	renderer = create_renderer(0);
+	droplets = droplet_store_create(&(struct droplet_store_params){.kernel = kernel});
+	renderer = droplets ? create_renderer(0) : NULL;
 	const int failed = renderer ? _cmocka_run_group_tests("tests", tests, count, NULL, NULL) : 77;
 	renderer_destroy(renderer);
+	droplet_store_destroy(droplets);
 	kernel_destroy(kernel);
 	return failed;
 }

@@ -1,0 +1,257 @@
+"""Droplets that are new: prepared beside the renderer, computed once, kept on disk."""
+import concurrent.futures
+import json
+import signal
+import socket
+import statistics
+import threading
+import time
+
+import pytest
+
+from conftest import SANITIZED, wait_for
+
+SMALL = {"width": 16, "height": 16}
+
+
+def scene(gamma, **sections):
+    """Small and without clouds, so that all its work is the droplets'."""
+    return {"dsd": {"gamma": gamma}, "clouds": {"type": "none"}, "output": SMALL, **sections}
+
+
+def computed(daemon):
+    return daemon.metric('stratus_droplet_tables_total{source="computed"}')
+
+
+def from_disk(daemon):
+    return daemon.metric('stratus_droplet_tables_total{source="disk"}')
+
+
+def warnings(daemon):
+    return [line for line in daemon.log.read_text().splitlines() if " warning " in line and " droplets: " in line]
+
+
+def together(daemon, scenes, **headers):
+    with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
+        return list(pool.map(lambda s: daemon.render(s, **headers), scenes))
+
+
+@pytest.fixture
+def restart(start_daemon, tmp_path):
+    """Daemons one after the other with the same state directory."""
+    running = []
+
+    def start(*flags):
+        if running:
+            assert running.pop().stop() == 0
+        running.append(start_daemon("--state-dir", str(tmp_path / "state"), *flags))
+        return running[-1]
+
+    start.folder = tmp_path / "state" / "droplets"
+    return start
+
+
+def test_computed_once(daemon):
+    before = computed(daemon)
+    assert daemon.render(scene(3.1)).status == 200
+    one = computed(daemon) - before
+    assert one >= 1
+    answers = together(daemon, [scene(3.2)] * 6)
+    assert {a.status for a in answers} == {200}
+    assert len({a.body for a in answers}) == 1
+    assert computed(daemon) - before == 2 * one
+    assert daemon.metric("stratus_droplet_tables_bytes") > 2 * 15e6
+
+
+def test_timing_says_where_they_came_from(daemon):
+    first, second = daemon.render(scene(3.3)), daemon.render(scene(3.3))
+    assert "desc" not in first.timing["optics"]
+    assert float(first.timing["optics"]["dur"]) > 20
+    assert second.timing["optics"]["desc"] == '"reused"'
+    assert float(second.timing["optics"]["dur"]) < float(first.timing["optics"]["dur"]) / 2
+    assert float(first.timing["total"]["dur"]) >= float(first.timing["optics"]["dur"])
+
+
+def test_other_skies_go_on(daemon):
+    """Pictures of known droplets keep coming while new ones are computed."""
+    known = scene(3.4)
+    assert daemon.render(known).status == 200
+    done, taken = threading.Event(), []
+
+    def ask_on():
+        while not done.is_set():
+            begin = time.monotonic()
+            assert daemon.render(known).status == 200
+            taken.append(time.monotonic() - begin)
+
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        asking = pool.submit(ask_on)
+        answers = [daemon.render(scene(4 + i / 16)) for i in range(8)]
+        done.set()
+        asking.result()
+    assert {a.status for a in answers} == {200}
+    computing = [float(a.timing["optics"]["dur"]) / 1000 for a in answers]
+    print(f"{len(taken)} pictures of known droplets, median {statistics.median(taken):.3f} s, beside 8 computations of"
+          f" {statistics.median(computing):.3f} s")
+    assert len(taken) > 3 * len(answers)
+    assert statistics.median(taken) < statistics.median(computing) / 2
+
+
+def test_those_who_wait_for_the_same_do_not_wait_for_others(daemon):
+    """One new distribution asked for twice, and four others in between: both come before the last."""
+    ended = {}
+    scenes = [scene(5.0), *(scene(5.1 + i / 10) for i in range(4)), scene(5.0)]
+
+    def ask(i):
+        time.sleep(0.005 * i)
+        answer = daemon.render(scenes[i])
+        ended[i] = time.monotonic()
+        return answer.status
+
+    with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
+        assert set(pool.map(ask, range(len(scenes)))) == {200}
+    assert ended[5] < ended[4]
+
+
+def test_kept_on_disk(restart):
+    daemon = restart()
+    assert daemon.render(scene(2.5)).status == 200
+    picture = daemon.render(scene(6.0)).body
+    daemon = restart()
+    again = daemon.render(scene(6.0))
+    assert again.body == picture
+    assert from_disk(daemon) >= 1
+    assert computed(daemon) == 0
+    assert "desc" not in again.timing["optics"]
+    assert daemon.metric("stratus_droplet_files_damaged_total") == 0
+
+
+def test_damaged_files_are_reported_and_replaced(restart):
+    daemon = restart()
+    picture = daemon.render(scene(6.5)).body
+    restart.folder.joinpath("mine.txt").write_text("kept")
+    daemon.stop()
+    files = sorted(restart.folder.glob("*-*"))
+    assert files
+    for i, path in enumerate(files):
+        data = bytearray(path.read_bytes())
+        if i % 2:
+            del data[-100:]
+        else:
+            data[len(data) // 2] ^= 4
+        path.write_bytes(data)
+    daemon = restart()
+    assert daemon.render(scene(6.5)).body == picture
+    bad = daemon.metric("stratus_droplet_files_damaged_total")
+    assert bad >= 1
+    assert len(warnings(daemon)) == bad
+    assert all(str(restart.folder) in line for line in warnings(daemon))
+    daemon = restart()
+    assert daemon.render(scene(6.5)).body == picture
+    assert computed(daemon) == 0 and from_disk(daemon) >= 1
+    assert daemon.metric("stratus_droplet_files_damaged_total") == 0
+    assert restart.folder.joinpath("mine.txt").read_text() == "kept"
+
+
+def test_killed_at_any_moment(restart, start_daemon):
+    """What is on disk afterwards is whole, and nothing else stays."""
+    for i in range(3):
+        daemon = start_daemon("--state-dir", str(restart.folder.parent))
+        together(daemon, [scene(7 + i + k / 8) for k in range(3)])
+        daemon.process.send_signal(signal.SIGKILL)
+        assert daemon.process.wait(timeout=60) == -signal.SIGKILL
+    daemon = restart()
+    assert wait_for(lambda: not list(restart.folder.glob("*.*")))
+    assert daemon.render(scene(7)).status == 200
+    assert daemon.metric("stratus_droplet_files_damaged_total") == 0
+
+
+def test_no_disk_is_a_warning(restart):
+    restart.folder.parent.mkdir()
+    restart.folder.write_text("a file")
+    daemon = restart()
+    assert {daemon.render(scene(8 + i)).status for i in range(3)} == {200}
+    daemon.stop()
+    assert len(warnings(daemon)) == 1
+    assert str(restart.folder) in warnings(daemon)[0]
+
+
+def test_disk_can_be_left_out(restart):
+    daemon = restart("--droplets-disk-mb", "0")
+    assert daemon.render(scene(9)).status == 200
+    daemon.stop()
+    assert not restart.folder.exists()
+
+
+def test_bounds_of_memory_and_disk(restart):
+    """Room for one distribution in memory, for two on disk; still all that are asked for at once come."""
+    daemon = restart("--droplets-mb", "16", "--droplets-disk-mb", "32")
+    answers = together(daemon, [scene(10 + i / 8) for i in range(8)])
+    assert {a.status for a in answers} == {200}
+    assert wait_for(lambda: daemon.metric("stratus_droplet_tables_bytes") <= 16 << 20)
+    daemon.stop()
+    files = list(restart.folder.iterdir())
+    assert 1 <= len([f for f in files if f.stat().st_size > 1 << 20]) <= 2
+    assert sum(f.stat().st_blocks * 512 for f in files) <= 32 << 20
+
+
+def test_full_line(start_daemon):
+    daemon = start_daemon("--queue-length", "1")
+    answers = together(daemon, [scene(11 + i / 16) for i in range(12)])
+    assert {a.status for a in answers} == {200, 503}
+    refused = [a for a in answers if a.status == 503]
+    for answer in refused:
+        assert answer.json["type"] == "urn:stratus:problem:queue-full"
+        assert int(answer.headers["Retry-After"]) >= 1
+    assert daemon.metric('stratus_queue_rejected_total{reason="full"}') == len(refused)
+    assert daemon.metric("stratus_queue_depth") == 0
+
+
+def test_depth_counts_those_who_wait_for_droplets(daemon):
+    depths = []
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        running = [pool.submit(daemon.render, scene(12 + i / 16)) for i in range(8)]
+        while not all(r.done() for r in running):
+            depths.append(daemon.metric("stratus_queue_depth"))
+    assert {r.result().status for r in running} == {200}
+    assert max(depths) >= 2
+    assert daemon.metric("stratus_queue_depth") == 0
+
+
+def test_deadline_while_preparing(daemon):
+    """Seen before the next computation, not at the end of the line."""
+    before = computed(daemon)
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        running = [pool.submit(daemon.render, scene(13 + i / 16)) for i in range(6)]
+        assert wait_for(lambda: daemon.metric("stratus_queue_depth") >= 3 or all(r.done() for r in running))
+        late = daemon.render(scene(14), X_Timeout_Ms="1")
+        assert late.status == 504
+        assert late.json["type"] == "urn:stratus:problem:deadline-passed"
+        assert {r.result().status for r in running} == {200}
+    one = (computed(daemon) - before) / 6
+    assert one == int(one)  # nothing was computed for the late one
+    assert daemon.render(scene(14)).status == 200
+
+
+def test_clients_that_leave_while_preparing(start_daemon):
+    daemon = start_daemon()
+    body = [json.dumps(scene(15 + i / 16)).encode() for i in range(8)]
+    for data in body:
+        client = socket.create_connection(("127.0.0.1", daemon.port))
+        client.sendall(b"POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(data) + data)
+        client.close()
+    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 1, 120)
+    assert daemon.metric('stratus_renders_ended_total{reason="abandoned"}') >= 6
+    assert computed(daemon) <= 4
+    assert daemon.render(scene(2)).status == 200
+
+
+def test_shutdown_finishes_what_is_prepared(start_daemon):
+    daemon = start_daemon()
+    scenes = [scene(16 + i / 16) for i in range(6)]
+    with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
+        running = [pool.submit(daemon.render, s) for s in scenes]
+        assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") >= 7 or any(r.done() for r in running))
+        daemon.process.send_signal(signal.SIGTERM)
+        assert {r.result().status for r in running} == {200}
+    assert daemon.process.wait(timeout=60) == 0

@@ -90,7 +90,7 @@ $(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
 
 $(B)/renderer/optics/paper_fit_solve.c.o: CFLAGS += $(call pkg,--cflags,cminpack)
 
-# The loops of the optics are the one place where the compiler's best vector code is worth asking for: nobody there reads errno or traps.
+# The optics are the one place where the compiler's best vector code is worth asking for: nobody there reads errno or traps.
 OPTICS_OPT := -O3 -g -ffp-contract=fast -fno-math-errno -fno-trapping-math
 $(B)/renderer/optics/%.c.o: OPT := $(OPTICS_OPT)
 

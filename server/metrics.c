@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/optics", "/v1/sun", "/v1/presets", "/",
-						     "/openapi.yaml", "/healthz",   "/readyz", "/metrics",    "other"};
+static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/optics", "/v1/slab", "/v1/sun",  "/v1/presets", "/",
+						     "/openapi.yaml", "/healthz",   "/readyz",  "/metrics", "other"};
 static const char *const rejection_names[REJECTION_COUNT] = {"full", "starting", "shutting_down"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
 static const char *const source_names[DROPLET_SOURCE_COUNT] = {
@@ -36,6 +36,8 @@ struct metrics {
 	unsigned long reused[TIMING_COUNT];
 	unsigned long rejected[REJECTION_COUNT];
 	unsigned long ended[END_COUNT];
+	unsigned long tracings_ended[END_COUNT];
+	double photons;
 };
 
 struct metrics *metrics_create(void)
@@ -100,6 +102,20 @@ void metrics_count_end(struct metrics *metrics, enum metrics_end end)
 {
 	pthread_mutex_lock(&metrics->mutex);
 	metrics->ended[end]++;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_photons(struct metrics *metrics, double photons)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->photons += photons;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_tracing_end(struct metrics *metrics, enum metrics_end end)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->tracings_ended[end]++;
 	pthread_mutex_unlock(&metrics->mutex);
 }
 
@@ -177,6 +193,19 @@ static void write_queue(struct text *text, const struct metrics *metrics, const 
 		text_printf(text, "stratus_renders_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->ended[i]);
 }
 
+static void write_tracings(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
+{
+	write_family(text, "tracings_waiting", "gauge", "Photon tracings waiting.");
+	text_printf(text, "stratus_tracings_waiting %zu\n", now->tracings_waiting);
+	write_family(text, "tracings_limit", "gauge", "Photon tracings that may wait.");
+	text_printf(text, "stratus_tracings_limit %zu\n", now->tracings_limit);
+	write_family(text, "photons", "counter", "Photons traced for answers, the bands together.");
+	text_printf(text, "stratus_photons_total %.0f\n", metrics->photons);
+	write_family(text, "tracings_ended", "counter", "Accepted photon tracings that brought no numbers, by reason.");
+	for (int i = 0; i < END_COUNT; i++)
+		text_printf(text, "stratus_tracings_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->tracings_ended[i]);
+}
+
 static void write_droplets(struct text *text, const struct droplet_store_counts *counts)
 {
 	write_family(text, "droplet_tables", "counter", "Uses of the tables of a droplet distribution, by where they came from.");
@@ -241,6 +270,7 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_requests(&text, copy);
 	write_stages(&text, copy);
 	write_queue(&text, copy, now);
+	write_tracings(&text, copy, now);
 	write_droplets(&text, &now->droplets);
 	write_infos(&text, now->info);
 	write_process(&text);

@@ -11,6 +11,7 @@
 enum metrics_route {
 	ROUTE_RENDER,
 	ROUTE_OPTICS,
+	ROUTE_SLAB,
 	ROUTE_SUN,
 	ROUTE_PRESETS,
 	ROUTE_INDEX,
@@ -37,11 +38,15 @@ void metrics_count_timings(struct metrics *metrics, const struct timings *timing
 void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection reason);
 /* Renders that were accepted and brought no picture. */
 void metrics_count_end(struct metrics *metrics, enum metrics_end end);
+/* Photons traced to their end, and tracings that were accepted and brought no numbers. */
+void metrics_count_photons(struct metrics *metrics, double photons);
+void metrics_count_tracing_end(struct metrics *metrics, enum metrics_end end);
 
 /* What is asked for at the moment of the scrape. info NULL: not ready yet. */
 struct metrics_now {
 	const struct renderer_info *info;
 	size_t queue_depth, queue_limit, requests_in_flight;
+	size_t tracings_waiting, tracings_limit;
 	struct droplet_store_counts droplets;
 };
 

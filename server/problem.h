@@ -21,6 +21,7 @@ enum problem_kind {
 	PROBLEM_INTERNAL,       /* 500 */
 	PROBLEM_RENDER_FAILED,  /* 500 */
 	PROBLEM_QUEUE_FULL,     /* 503 */
+	PROBLEM_TRACINGS_FULL,  /* 503 */
 	PROBLEM_NO_MEMORY,      /* 503 */
 	PROBLEM_STARTING,       /* 503 */
 	PROBLEM_SHUTTING_DOWN,  /* 503 */

@@ -3,6 +3,7 @@
 #include "server/clock.h"
 #include "server/service.h"
 
+#include <errno.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -76,6 +77,20 @@ void request_identify(struct request *request)
 		memcpy(random, &request->started_ms, sizeof request->started_ms);
 	for (size_t i = 0; i < sizeof random; i++)
 		snprintf(request->id + 2 * i, 3, "%02x", random[i]);
+}
+
+double request_read_deadline(struct request *request)
+{
+	const char *text = request_header(request, "X-Timeout-Ms");
+	if (!text)
+		return request->started_ms + request->service->config->timeout_ms;
+	char *end;
+	errno = 0;
+	long milliseconds = strtol(text, &end, 10);
+	if (errno != 0 || end == text || *end != '\0' || milliseconds < 1 || milliseconds > REQUEST_TIMEOUT_MS_MAX)
+		problem_set(&request->problem, PROBLEM_BAD_REQUEST, "X-Timeout-Ms must be a whole number from 1 to %d.",
+			    REQUEST_TIMEOUT_MS_MAX);
+	return request->started_ms + (double)milliseconds;
 }
 
 void request_suspend(struct request *request, request_handler *next)

@@ -14,7 +14,7 @@
 #include <jansson.h>
 #include <microhttpd.h>
 
-enum { REQUEST_ID_SIZE = 129, REQUEST_BODY_MAX = 1 << 20 };
+enum { REQUEST_ID_SIZE = 129, REQUEST_BODY_MAX = 1 << 20, REQUEST_TIMEOUT_MS_MAX = 3600000 };
 
 struct request;
 struct service;
@@ -60,6 +60,10 @@ const char *request_header(const struct request *request, const char *name);
 
 /* Takes X-Request-Id over when it is short and plain, else makes one up. HTTP thread. */
 void request_identify(struct request *request);
+
+/* When the answer is no longer wanted, on the clock of clock_now_ms: X-Timeout-Ms, or the configured default, after the request began.
+ * Without meaning, and a problem, when that is no such number. HTTP thread. */
+double request_read_deadline(struct request *request);
 
 /* HTTP thread: no more calls for this request until request_resume; then `next` runs. */
 void request_suspend(struct request *request, request_handler *next);

@@ -21,6 +21,17 @@ struct MHD_Response *response_create(char *data, size_t size)
 	return response;
 }
 
+static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size_t size)
+{
+	(void)context, (void)position, (void)buffer, (void)size;
+	return MHD_CONTENT_READER_END_OF_STREAM;
+}
+
+struct MHD_Response *response_create_unsized(void)
+{
+	return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1024, read_nothing, NULL, NULL);
+}
+
 void response_set(struct MHD_Response *response, const char *name, const char *value)
 {
 	if (response && MHD_add_response_header(response, name, value) != MHD_YES)
@@ -55,6 +66,8 @@ static unsigned retry_after(const struct request *request)
 	switch (request->problem.kind) {
 	case PROBLEM_QUEUE_FULL:
 		return service_retry_seconds(request->service);
+	case PROBLEM_TRACINGS_FULL:
+		return service_tracing_retry_seconds(request->service);
 	case PROBLEM_STARTING:
 		return 2;
 	case PROBLEM_SHUTTING_DOWN:

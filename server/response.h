@@ -10,6 +10,8 @@
 
 /* Takes over malloc'd data (also on failure). NULL when out of memory. */
 struct MHD_Response *response_create(char *data, size_t size);
+/* For a HEAD that is answered without computing, so that the length is unknown. */
+struct MHD_Response *response_create_unsized(void);
 void response_set(struct MHD_Response *response, const char *name, const char *value);
 
 /* Sends with the headers every answer has; the response is given up in any case. NULL answers nothing. */

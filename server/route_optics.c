@@ -4,8 +4,6 @@
  */
 #include "server/routes.h"
 
-#include "renderer/optics/optics.h"
-#include "renderer/optics/paper_slab.h"
 #include "server/clock.h"
 #include "server/number_text.h"
 #include "server/query.h"
@@ -25,8 +23,9 @@ struct optics_work {
 	struct scene_input input;
 	double sun_zenith_deg;
 	bool zenith_given, refused;
+	double deadline_ms;
+	bool late;
 	json_t *answer;
-	double computed_ms;
 };
 
 static void work_destroy(void *context)
@@ -112,34 +111,42 @@ static json_t *phase_to_json(const struct optics *optics)
 	return json_pack("{s:o, s:o}", "angle_deg", angles, "value", values);
 }
 
-static json_t *fit_to_json(double sun_zenith_deg)
+static json_t *fit_to_json(const struct paper_fit_table *table, double sun_zenith_deg)
 {
-	const struct paper_fit fit = paper_fit_at(sun_zenith_deg * M_PI / 180);
+	const struct paper_fit fit = paper_fit_table_at(table, sun_zenith_deg * M_PI / 180);
 	return json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:f}", "beta", fit.beta, "sun_zenith_deg", sun_zenith_deg, "b", fit.b, "c", fit.c,
 			 "kappa_c", fit.kappa_c, "t", fit.t, "r", fit.r);
 }
 
-static json_t *optics_to_json(const struct optics *optics, double sun_zenith_deg)
+static json_t *optics_to_json(const struct optics *optics, const struct paper_fit_table *table, double sun_zenith_deg)
 {
 	return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "wavelength_nm", numbers_to_json(band_wavelength_nm, BAND_COUNT),
 			 "extinction_per_m", numbers_to_json(optics->extinction_per_m, BAND_COUNT), "asymmetry",
 			 numbers_to_json(optics->asymmetry, BAND_COUNT), "single_scattering_albedo",
 			 numbers_to_json(optics->single_scattering_albedo, BAND_COUNT), "forward_peak_fraction",
 			 numbers_to_json(optics->forward_peak_fraction, BAND_COUNT), "phase_function", phase_to_json(optics), "paper_fit",
-			 fit_to_json(sun_zenith_deg));
+			 fit_to_json(table, sun_zenith_deg));
 }
 
 static void compute(struct work *base)
 {
 	struct optics_work *work = (struct optics_work *)((char *)base - offsetof(struct optics_work, work));
 	const struct scene *scene = &work->input.scene;
+	struct droplet_store *store = render_thread_droplets(work->request->service->render_thread);
+	struct timings *timings = &work->request->timings;
+	struct paper_fit_table fit;
+	enum droplet_source source, fit_source;
 	double start = clock_now_ms();
-	struct optics *optics =
-		optics_create(render_thread_kernel(work->request->service->render_thread), &scene->dsd, scene->model.optics);
-	if (optics)
-		work->answer = optics_to_json(optics, work->sun_zenith_deg);
-	optics_destroy(optics);
-	work->computed_ms = clock_now_ms() - start;
+	const struct droplet_tables *tables = droplet_store_get(store, &scene->dsd, scene->model.optics, &source);
+	bool good = tables && droplet_store_get_fit(store, &scene->dsd, scene->model.optics, &fit, &fit_source);
+	double ready = clock_now_ms();
+	timings_set(timings, TIMING_OPTICS, ready - start);
+	timings->entry[TIMING_OPTICS].reused = good && source == DROPLETS_FROM_MEMORY && fit_source == DROPLETS_FROM_MEMORY;
+	work->late = ready >= work->deadline_ms;
+	if (good && !work->late)
+		work->answer = optics_to_json(tables->optics, &fit, work->sun_zenith_deg);
+	if (tables)
+		droplet_store_release(store, tables);
 	request_resume(work->request);
 }
 
@@ -150,10 +157,11 @@ static enum MHD_Result finish(struct request *request)
 		metrics_count_rejection(request->service->metrics, REJECTED_FULL);
 		return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "The workers are busy.");
 	}
+	if (work->late)
+		return response_send_new_problem(request, PROBLEM_DEADLINE, "The optics were not ready within their deadline.");
 	if (!work->answer)
 		return response_send_new_problem(request, PROBLEM_INTERNAL,
 						 "The optics could not be computed. The log has the reason under %s.", request->id);
-	timings_set(&request->timings, TIMING_OPTICS, work->computed_ms);
 	json_t *answer = work->answer;
 	work->answer = NULL;
 	return response_send_json(request, MHD_HTTP_OK, answer, CACHE_KEEP);
@@ -169,6 +177,7 @@ enum MHD_Result route_optics(struct request *request)
 	request->work = work;
 	request->work_destroy = work_destroy;
 	read_parameters(request, work);
+	work->deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);
 	/* Suspended first: a worker may be done before worker_pool_try returns. */

@@ -19,12 +19,9 @@
 #include "server/scene_rules.h"
 #include "server/service.h"
 
-#include <errno.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { TIMEOUT_MS_MAX = 3600000 };
 
 struct render_work {
 	struct render_job job; /* for the render thread */
@@ -102,21 +99,6 @@ static void read_scene(struct request *request, struct scene_input *input)
 			    image_content_types[*format]);
 }
 
-/* X-Timeout-Ms, or the configured default; 0 and a problem when it is no such number. */
-static int read_timeout(struct request *request)
-{
-	const char *text = request_header(request, "X-Timeout-Ms");
-	if (!text)
-		return request->service->config->timeout_ms;
-	char *end;
-	errno = 0;
-	long milliseconds = strtol(text, &end, 10);
-	if (errno == 0 && end != text && *end == '\0' && milliseconds >= 1 && milliseconds <= TIMEOUT_MS_MAX)
-		return (int)milliseconds;
-	problem_set(&request->problem, PROBLEM_BAD_REQUEST, "X-Timeout-Ms must be a whole number from 1 to %d.", TIMEOUT_MS_MAX);
-	return 0;
-}
-
 /* What follows from the scene alone. false when out of memory. */
 static bool describe(struct render_work *work, const struct service *service)
 {
@@ -149,18 +131,6 @@ static enum MHD_Result send_image(struct request *request, unsigned status, stru
 	response_set(response, "X-Scene-Key", work->key);
 	response_set(response, "Content-Location", work->location);
 	return response_send(request, status, response);
-}
-
-/* A HEAD is answered without rendering, so its length is unknown. */
-static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size_t size)
-{
-	(void)context, (void)position, (void)buffer, (void)size;
-	return MHD_CONTENT_READER_END_OF_STREAM;
-}
-
-static enum MHD_Result send_head(struct request *request)
-{
-	return send_image(request, MHD_HTTP_OK, MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1024, read_nothing, NULL, NULL));
 }
 
 static enum MHD_Result finish(struct request *request)
@@ -255,11 +225,11 @@ static void on_rendered(struct render_job *job)
 
 /* --- the way through ------------------------------------------------------------------------------------------------------------ */
 
-static enum MHD_Result enqueue(struct request *request, int timeout_ms)
+static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 {
 	struct render_work *work = request->work;
 	work->job.scene = &work->input.scene;
-	work->job.deadline_ms = request->started_ms + timeout_ms;
+	work->job.deadline_ms = deadline_ms;
 	work->job.abandoned = is_abandoned;
 	work->job.finished = on_rendered;
 	work->encode.run = encode;
@@ -282,7 +252,7 @@ enum MHD_Result route_render(struct request *request)
 	request->work_destroy = work_destroy;
 
 	read_scene(request, &work->input);
-	int timeout_ms = read_timeout(request);
+	double deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);
 	if (!describe(work, request->service))
@@ -290,6 +260,6 @@ enum MHD_Result route_render(struct request *request)
 	if (!request->is_post && entity_tag_matches(request_header(request, "If-None-Match"), work->tag))
 		return send_image(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
 	if (request->is_head)
-		return send_head(request);
-	return enqueue(request, timeout_ms);
+		return send_image(request, MHD_HTTP_OK, response_create_unsized());
+	return enqueue(request, deadline_ms);
 }

@@ -41,6 +41,8 @@ enum MHD_Result route_metrics(struct request *request)
 		.queue_depth = service_queue_depth(service),
 		.queue_limit = (size_t)service->config->queue_length,
 		.requests_in_flight = service->in_flight,
+		.tracings_waiting = worker_pool_waiting(service->tracers),
+		.tracings_limit = SERVICE_TRACINGS_MAX,
 	};
 	if (service->ready)
 		now.droplets = droplet_store_counts(render_thread_droplets(service->render_thread));

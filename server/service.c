@@ -2,6 +2,7 @@
 
 #include "renderer/log.h"
 #include "renderer/optics/kernel.h"
+#include "renderer/optics/slab.h"
 #include "server/clock.h"
 #include "server/digest.h"
 #include "server/http.h"
@@ -15,6 +16,9 @@
 /* A render, or what it needs, longer than this is a hang that a restart cures. */
 #define HANG_MS 300000.0
 
+/* Tracing photons takes what rendering and encoding leave. */
+enum { TRACER_NICE = 10 };
+
 static size_t worker_count(const struct config *config)
 {
 	long processors = sysconf(_SC_NPROCESSORS_ONLN);
@@ -24,15 +28,17 @@ static size_t worker_count(const struct config *config)
 }
 
 /* What an entity tag must know besides the scene: two builds may round differently, so the program itself is part of it, shaders embedded.
- * Shaders read from disk may change between two starts of one version, so a start then counts as a version of its own. */
+ * Last bits of the solved slab depend on the processor's vectors. Shaders read from disk may change between two starts of one version, so a
+ * start then counts as a version of its own. */
 static char *pixel_version(const struct service *service)
 {
 	struct text text = {0};
 	char program[DIGEST_SIZE] = "";
 	digest_of_file("/proc/self/exe", program);
 	const struct renderer_info *info = render_thread_info(service->render_thread);
-	text_printf(&text, "%s|%s|%s|%s|%s|%s|%d|%llx", RENDERER_VERSION, program, service->images->version, info->vendor, info->renderer,
-		    info->version, (int)info->pass_kind, kernel_hash(render_thread_kernel(service->render_thread)));
+	text_printf(&text, "%s|%s|%s|%s|%s|%s|%d|%d|%llx", RENDERER_VERSION, program, service->images->version, info->vendor,
+		    info->renderer, info->version, (int)info->pass_kind, slab_vector_bytes(),
+		    kernel_hash(render_thread_kernel(service->render_thread)));
 	if (service->config->shader_dir)
 		text_printf(&text, "|%d|%f", (int)getpid(), clock_now_ms());
 	return text_take(&text);
@@ -72,8 +78,9 @@ struct service *service_create(const struct config *config)
 	service->listening_socket = -1;
 	service->metrics = metrics_create();
 	service->queue = render_queue_create((size_t)config->queue_length);
-	service->workers = worker_pool_create(workers, 2 * workers);
-	if (service->metrics && service->queue && service->workers && http_start(service) && start_rendering(service))
+	service->workers = worker_pool_create(workers, 2 * workers, 0);
+	service->tracers = worker_pool_create(1, SERVICE_TRACINGS_MAX, TRACER_NICE);
+	if (service->metrics && service->queue && service->workers && service->tracers && http_start(service) && start_rendering(service))
 		return service;
 	service_destroy(service);
 	return NULL;
@@ -137,6 +144,7 @@ void service_destroy(struct service *service)
 		render_queue_close(service->queue);
 	render_thread_destroy(service->render_thread);
 	worker_pool_destroy(service->workers);
+	worker_pool_destroy(service->tracers);
 	render_queue_destroy(service->queue);
 	metrics_destroy(service->metrics);
 	free(service->pixel_version);
@@ -161,12 +169,23 @@ size_t service_queue_depth(const struct service *service)
 	return render_queue_depth(service->queue) + (service->ready ? preparation_depth(service->preparation) : 0);
 }
 
+static unsigned whole_seconds(double milliseconds)
+{
+	double seconds = milliseconds * 1e-3;
+	return seconds < 1 ? 1 : seconds > 60 ? 60 : (unsigned)seconds;
+}
+
 unsigned service_retry_seconds(const struct service *service)
 {
 	double milliseconds = (double)render_queue_depth(service->queue) * render_thread_typical_ms(service->render_thread);
 	if (service->ready)
 		milliseconds += (double)preparation_depth(service->preparation) * preparation_typical_ms(service->preparation);
-	return milliseconds < 1e3 ? 1 : milliseconds > 60e3 ? 60 : (unsigned)(milliseconds * 1e-3);
+	return whole_seconds(milliseconds);
+}
+
+unsigned service_tracing_retry_seconds(const struct service *service)
+{
+	return whole_seconds(service->tracing_ms);
 }
 
 bool service_refuses(struct request *request)

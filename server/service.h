@@ -19,6 +19,9 @@ enum service_state {
 	SERVICE_FAILED    /* a restart is needed */
 };
 
+/* Photon tracings that may wait for the one that runs. */
+enum { SERVICE_TRACINGS_MAX = 4 };
+
 struct MHD_Daemon;
 
 /* Read by the routes; what is not atomic does not change from the moment `ready` is true. */
@@ -29,18 +32,20 @@ struct service {
 	struct render_thread *_Atomic render_thread;
 	struct preparation *preparation; /* once ready */
 	struct worker_pool *workers;
+	struct worker_pool *tracers; /* one thread that traces photons, on all processors, behind everything else */
 	struct MHD_Daemon *daemon;
 	const struct image_api *images;
-	char *pixel_version; /* everything but the scene that decides about an image's bytes */
+	char *pixel_version; /* everything but the question that decides about an answer's bytes */
 	char host[256];      /* listening address as a URL says it */
 	unsigned port;
 	int listening_socket; /* taken from libmicrohttpd while stopping; else negative */
 
-	_Atomic size_t in_flight; /* requests read to their end and not answered to theirs */
-	_Atomic size_t suspended; /* those of them that others work for */
-	_Atomic bool ready;       /* has been ready to render */
-	_Atomic bool stopping;    /* takes no new work */
-	_Atomic bool giving_up;   /* drops the accepted work too */
+	_Atomic size_t in_flight;  /* requests read to their end and not answered to theirs */
+	_Atomic size_t suspended;  /* those of them that others work for */
+	_Atomic double tracing_ms; /* what the last tracing took */
+	_Atomic bool ready;        /* has been ready to render */
+	_Atomic bool stopping;     /* takes no new work */
+	_Atomic bool giving_up;    /* drops the accepted work too */
 };
 
 /* Starts serving; rendering comes up behind. NULL (and a log line) on failure, such as an address in use. Main thread. */
@@ -60,6 +65,8 @@ size_t service_queue_depth(const struct service *service);
 
 /* A guess at when the queue has room again, from 1. Any thread. */
 unsigned service_retry_seconds(const struct service *service);
+/* Likewise for photon tracings. */
+unsigned service_tracing_retry_seconds(const struct service *service);
 
 /* States why the service takes no work at present and counts it. false when it does take work. HTTP thread. */
 struct request;

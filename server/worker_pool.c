@@ -4,12 +4,15 @@
 
 #include <pthread.h>
 #include <stdlib.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 struct worker_pool {
 	pthread_mutex_t mutex;
 	pthread_cond_t arrived, left;
 	struct work *first, **last;
 	size_t waiting, backlog;
+	int nice;
 	bool closed;
 	size_t thread_count;
 	pthread_t threads[];
@@ -34,12 +37,15 @@ static struct work *take_work(struct worker_pool *pool)
 
 static void *work_until_closed(void *context)
 {
+	const struct worker_pool *pool = context;
+	if (pool->nice > 0 && setpriority(PRIO_PROCESS, (id_t)gettid(), pool->nice) != 0)
+		log_warning("worker_pool: setpriority failed");
 	for (struct work *work; (work = take_work(context));)
 		work->run(work);
 	return NULL;
 }
 
-struct worker_pool *worker_pool_create(size_t threads, size_t backlog)
+struct worker_pool *worker_pool_create(size_t threads, size_t backlog, int nice)
 {
 	struct worker_pool *pool = calloc(1, sizeof *pool + threads * sizeof *pool->threads);
 	if (!pool) {
@@ -51,6 +57,7 @@ struct worker_pool *worker_pool_create(size_t threads, size_t backlog)
 	pthread_cond_init(&pool->left, NULL);
 	pool->last = &pool->first;
 	pool->backlog = backlog;
+	pool->nice = nice;
 	while (pool->thread_count < threads) {
 		if (pthread_create(&pool->threads[pool->thread_count], NULL, work_until_closed, pool) != 0) {
 			log_error("worker_pool_create: pthread_create failed");
@@ -104,4 +111,37 @@ void worker_pool_wait(struct worker_pool *pool, struct work *work)
 		pthread_cond_wait(&pool->left, &pool->mutex);
 	append(pool, work);
 	pthread_mutex_unlock(&pool->mutex);
+}
+
+/* Takes one piece of work that is over out of those that wait. */
+static struct work *take_over(struct worker_pool *pool, bool (*is_over)(struct work *work))
+{
+	pthread_mutex_lock(&pool->mutex);
+	struct work **link = &pool->first;
+	while (*link && !is_over(*link))
+		link = &(*link)->next;
+	struct work *work = *link;
+	if (work) {
+		*link = work->next;
+		if (!*link)
+			pool->last = link;
+		pool->waiting--;
+		pthread_cond_signal(&pool->left);
+	}
+	pthread_mutex_unlock(&pool->mutex);
+	return work;
+}
+
+void worker_pool_sweep(struct worker_pool *pool, bool (*is_over)(struct work *work))
+{
+	for (struct work *work; (work = take_over(pool, is_over));)
+		work->run(work);
+}
+
+size_t worker_pool_waiting(struct worker_pool *pool)
+{
+	pthread_mutex_lock(&pool->mutex);
+	size_t waiting = pool->waiting;
+	pthread_mutex_unlock(&pool->mutex);
+	return waiting;
 }

@@ -1,4 +1,4 @@
-/* A few threads for work that needs a processor but no GPU: encoding images, computing optics. Any thread.
+/* A few threads for work that needs a processor but no GPU: encoding images, computing optics, tracing photons. Any thread.
  *
  * The backlog is bounded, so that frames waiting to be encoded cannot fill the memory.
  */
@@ -16,8 +16,9 @@ struct work {
 
 struct worker_pool;
 
-/* threads and backlog from 1. NULL (and a log line) on failure. */
-struct worker_pool *worker_pool_create(size_t threads, size_t backlog);
+/* threads and backlog from 1; nice: how far the threads, and those they make, stand back behind others, 0..19. NULL (and a log line) on
+ * failure. */
+struct worker_pool *worker_pool_create(size_t threads, size_t backlog, int nice);
 
 /* Does all work that was accepted, then ends. Takes NULL. */
 void worker_pool_destroy(struct worker_pool *pool);
@@ -27,5 +28,11 @@ bool worker_pool_try(struct worker_pool *pool, struct work *work);
 
 /* Hands work over, waiting for room. Never from the pool's own threads. */
 void worker_pool_wait(struct worker_pool *pool, struct work *work);
+
+/* Runs waiting work that is over (late, or nobody waits for it any more) at once, by the caller. `is_over` must be quick. */
+void worker_pool_sweep(struct worker_pool *pool, bool (*is_over)(struct work *work));
+
+/* Work that waits now. */
+size_t worker_pool_waiting(struct worker_pool *pool);
 
 #endif

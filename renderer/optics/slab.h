@@ -67,6 +67,9 @@ struct slab_solution *slab_solve(const struct optics *optics, int threads);
 bool slab_solve_into(const struct optics *optics, int threads, struct slab_solution *solution);
 void slab_destroy(struct slab_solution *solution);
 
+/* Of the vectors that this processor solves with: 16, 32 or 64. */
+int slab_vector_bytes(void);
+
 /* --- radiance; any thread ------------------------------------------------------------------------------------------------------ */
 
 /* All orders but the unscattered beam, >= 0. optics: those that were solved. */
@@ -79,6 +82,17 @@ double slab_radiance_single(const struct slab_solution *solution, const struct o
 			    double mu_l, double mu_v, double azimuth);
 double slab_radiance_multiple(const struct slab_solution *solution, int band, enum slab_side side, double tau, double mu_l, double mu_v,
 			      double azimuth);
+
+/* Orders >= 2 as a series in azimuth, for many azimuths of one pair of directions: 12 us, and 0.1 us for an azimuth of it. */
+struct slab_series {
+	double mode[SLAB_MODE_COUNT];
+};
+void slab_multiple_series(const struct slab_solution *solution, int band, enum slab_side side, double tau, double mu_l, double mu_v,
+			  struct slab_series *series);
+double slab_series_radiance(const struct slab_series *series, double azimuth);
+
+/* Cosine of the scattering angle, -1..1. mu_l and mu_v in 0..1, azimuth finite. */
+double slab_scattering_cosine(enum slab_side side, double mu_l, double mu_v, double azimuth);
 
 /* --- fluxes; any thread -------------------------------------------------------------------------------------------------------- */
 

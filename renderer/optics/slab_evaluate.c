@@ -71,27 +71,19 @@ double slab_multiple_scale(const struct slab_band *band, double tau, double mu_l
 
 /* --- orders 2 and more --------------------------------------------------------------------------------------------------------- */
 
-/* sum_m K_m cos(m azimuth) with what each pair of nodes contributes. */
-static double sum_modes(const struct slab_band *band, enum slab_side side, const struct stencil *depth, const double *pair_factor,
-			double sines, double azimuth)
+/* K_m at a depth with what each pair of nodes contributes. */
+static double mode_at(const struct slab_band *band, enum slab_side side, const struct stencil *depth, int mode, const double *pair_factor)
 {
-	double sum = 0, step = cos(azimuth), now = 1, before = step;
-	for (int mode = 0; mode < SLAB_MODE_COUNT; mode++) {
-		double value = 0;
-		for (int k = 0; k < STENCIL; k++) {
-			const float *row = band->order2[side][depth->first + k][mode];
-			double partial[4] = {0};
-			for (int pair = 0; pair < SLAB_PAIR_COUNT; pair += 4)
-				for (int lane = 0; lane < 4; lane++)
-					partial[lane] += pair_factor[pair + lane] * row[pair + lane];
-			value += depth->factor[k] * (partial[0] + partial[1] + partial[2] + partial[3]);
-		}
-		sum += value * now * (mode % 2 ? sines : 1);
-		double next = 2 * step * now - before;
-		before = now;
-		now = next;
+	double value = 0;
+	for (int k = 0; k < STENCIL; k++) {
+		const float *row = band->order2[side][depth->first + k][mode];
+		double partial[4] = {0};
+		for (int pair = 0; pair < SLAB_PAIR_COUNT; pair += 4)
+			for (int lane = 0; lane < 4; lane++)
+				partial[lane] += pair_factor[pair + lane] * row[pair + lane];
+		value += depth->factor[k] * (partial[0] + partial[1] + partial[2] + partial[3]);
 	}
-	return sum;
+	return value;
 }
 
 _Static_assert(SLAB_PAIR_COUNT % 4 == 0, "whole lanes");
@@ -106,24 +98,46 @@ static void pair_factors(const struct slab_solution *solution, double mu_l, doub
 			factor[pair] = i == j ? sun[i] * view[i] : sun[i] * view[j] + sun[j] * view[i];
 }
 
-double slab_radiance_multiple(const struct slab_solution *solution, int band, enum slab_side side, double tau, double mu_l, double mu_v,
-			      double azimuth)
+void slab_multiple_series(const struct slab_solution *solution, int band, enum slab_side side, double tau, double mu_l, double mu_v,
+			  struct slab_series *series)
 {
 	const struct slab_band *table = &solution->band[band];
 	mu_l = clamp_unit(mu_l);
 	mu_v = clamp_unit(mu_v);
 	tau = clamp_depth(tau);
-	azimuth = isfinite(azimuth) ? azimuth : 0;
-	double factor[SLAB_PAIR_COUNT], sines = sine_of(mu_l) * sine_of(mu_v);
+	double factor[SLAB_PAIR_COUNT], sines = sine_of(mu_l) * sine_of(mu_v), scale = slab_multiple_scale(table, tau, mu_l, mu_v);
 	pair_factors(solution, mu_l, mu_v, factor);
 	struct stencil depth = stencil_at(slab_depth_coordinate(tau), SLAB_DEPTH_COUNT);
-	double k = sum_modes(table, side, &depth, factor, sines, azimuth), share = slab_thick_share(table, tau);
-	if (share < 1) {
-		/* What a thick layer does not transmit it reflects in the same directions. */
-		double through = side == SLAB_TRANSMITTED ? k : sum_modes(table, SLAB_TRANSMITTED, &depth, factor, sines, azimuth);
-		k += side == SLAB_TRANSMITTED ? (share - 1) * through : (1 - share) * through;
+	double share = slab_thick_share(table, tau);
+	for (int mode = 0; mode < SLAB_MODE_COUNT; mode++) {
+		double k = mode_at(table, side, &depth, mode, factor);
+		if (share < 1) {
+			/* What a thick layer does not transmit it reflects in the same directions. */
+			double through = side == SLAB_TRANSMITTED ? k : mode_at(table, SLAB_TRANSMITTED, &depth, mode, factor);
+			k += side == SLAB_TRANSMITTED ? (share - 1) * through : (1 - share) * through;
+		}
+		series->mode[mode] = k * scale * (mode % 2 ? sines : 1);
 	}
-	return fmax(k, 0) * slab_multiple_scale(table, tau, mu_l, mu_v);
+}
+
+double slab_series_radiance(const struct slab_series *series, double azimuth)
+{
+	double sum = 0, step = cos(isfinite(azimuth) ? azimuth : 0), now = 1, before = step;
+	for (int mode = 0; mode < SLAB_MODE_COUNT; mode++) {
+		sum += series->mode[mode] * now;
+		double next = 2 * step * now - before;
+		before = now;
+		now = next;
+	}
+	return fmax(sum, 0);
+}
+
+double slab_radiance_multiple(const struct slab_solution *solution, int band, enum slab_side side, double tau, double mu_l, double mu_v,
+			      double azimuth)
+{
+	struct slab_series series;
+	slab_multiple_series(solution, band, side, tau, mu_l, mu_v, &series);
+	return slab_series_radiance(&series, azimuth);
 }
 
 /* --- the first order ----------------------------------------------------------------------------------------------------------- */
@@ -150,29 +164,35 @@ void slab_residual_column(const struct slab_band *band, enum slab_side side, dou
 	}
 }
 
+double slab_single_geometry(enum slab_side side, double tau, double mu_l, double mu_v, double *depth)
+{
+	double a = slant(tau, mu_l), b = slant(tau, mu_v);
+	if (side == SLAB_REFLECTED) {
+		*depth = a + b;
+		return mu_l + mu_v > 0 ? mu_l / (mu_l + mu_v) * lost(a + b) : 0;
+	}
+	/* depth/mu_v times the mean attenuation: at mu_v = 0 the light of the last layer, exp(-a). */
+	*depth = isinf(a) || isinf(b) ? fmin(a, b) + 1 : slab_mean_depth(a, b);
+	if (isinf(*depth))
+		return 0;
+	return isinf(b) ? exp(-a) : b * slab_mean_attenuation(a, b);
+}
+
+double slab_scattering_cosine(enum slab_side side, double mu_l, double mu_v, double azimuth)
+{
+	double along = side == SLAB_TRANSMITTED ? mu_l * mu_v : -mu_l * mu_v;
+	return fmin(fmax(along + sine_of(mu_l) * sine_of(mu_v) * cos(azimuth), -1), 1);
+}
+
 double slab_radiance_single(const struct slab_solution *solution, const struct optics *optics, int band, enum slab_side side, double tau,
 			    double mu_l, double mu_v, double azimuth)
 {
 	const struct slab_band *table = &solution->band[band];
 	mu_l = clamp_unit(mu_l);
 	mu_v = clamp_unit(mu_v);
-	tau = clamp_depth(tau);
 	azimuth = isfinite(azimuth) ? azimuth : 0;
-	double scaled = (1 - table->truncated) * tau, a = slant(scaled, mu_l), b = slant(scaled, mu_v);
-	double along = side == SLAB_TRANSMITTED ? mu_l * mu_v : -mu_l * mu_v;
-	double angle = acos(fmin(fmax(along + sine_of(mu_l) * sine_of(mu_v) * cos(azimuth), -1), 1));
-	double geometry, s;
-	if (side == SLAB_REFLECTED) {
-		geometry = mu_l + mu_v > 0 ? mu_l / (mu_l + mu_v) * lost(a + b) : 0;
-		s = a + b;
-	} else {
-		/* depth/mu_v times the mean attenuation: at mu_v = 0 the light of the last layer, exp(-a). */
-		double mean = slab_mean_attenuation(a, b);
-		geometry = isinf(b) ? exp(-a) : b * mean;
-		s = isinf(a) || isinf(b) ? fmin(a, b) + 1 : slab_mean_depth(a, b);
-		if (isinf(s))
-			geometry = 0;
-	}
+	double angle = acos(slab_scattering_cosine(side, mu_l, mu_v, azimuth)), s;
+	double geometry = slab_single_geometry(side, (1 - table->truncated) * clamp_depth(tau), mu_l, mu_v, &s);
 	if (!(geometry > 0))
 		return 0;
 	double sharp = side == SLAB_TRANSMITTED ? exp(-s * table->truncated / (1 - table->truncated)) : 1;

@@ -24,4 +24,9 @@ double slab_thick_share(const struct slab_band *band, double tau);
 /* Radiance of orders >= 2 over K: mu_l/pi (1 - exp(-tau'/mu_l)) (1 - exp(-tau'/mu_v)). Arguments in range. */
 double slab_multiple_scale(const struct slab_band *band, double tau, double mu_l, double mu_v);
 
+/* Radiance of light scattered once by a layer of depth tau >= 0, over P/(4 pi) and F0, and in *depth the mean slant depth that it came
+ * through: mu_l/(mu_l+mu_v) (1 - exp(-tau/mu_l - tau/mu_v)) reflected, mu_l/(mu_l-mu_v) (exp(-tau/mu_l) - exp(-tau/mu_v)) transmitted.
+ * Finite everywhere, also at mu_l = mu_v and at 0; mu_l and mu_v in 0..1. */
+double slab_single_geometry(enum slab_side side, double tau, double mu_l, double mu_v, double *depth);
+
 #endif

@@ -217,3 +217,8 @@ void slab_destroy(struct slab_solution *solution)
 {
 	free(solution);
 }
+
+int slab_vector_bytes(void)
+{
+	return layer_vector_bytes();
+}

@@ -121,7 +121,40 @@ def test_canonical_scene_has_the_members_of_the_contract(daemon, read_image):
     assert set(embedded) == set(SECTIONS)
 
 
+def resolve(schema):
+    while "$ref" in schema:
+        beside = {name: value for name, value in schema.items() if name != "$ref"}
+        schema = {**CONTRACT["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]], **beside}
+    return schema
+
+
+TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+
+
+def assert_conforms(value, schema, place=""):
+    """As much of JSON Schema as the contract uses."""
+    schema = resolve(schema)
+    for part in schema.get("allOf", []):
+        assert_conforms(value, part, place)
+    if "type" in schema:
+        assert isinstance(value, TYPES[schema["type"]]), place
+        assert schema["type"] == "boolean" or not isinstance(value, bool), place
+    assert value in schema.get("enum", [value]), place
+    assert value == schema.get("const", value), place
+    assert set(schema.get("required", [])) <= set(value) if isinstance(value, dict) else True, place
+    for name, inner in schema.get("properties", {}).items():
+        if name in value:
+            assert_conforms(value[name], inner, f"{place}/{name}")
+    if isinstance(value, list):
+        assert schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)), place
+        for i, element in enumerate(value):
+            assert_conforms(element, schema.get("items", {}), f"{place}/{i}")
+    if isinstance(value, (int, float)):
+        assert schema.get("minimum", value) <= value <= schema.get("maximum", value), place
+
+
 EXAMPLES = {
+    "/v1/slab": "/v1/slab?optical_thickness=8&sun_zenith_deg=60",
     "/v1/sun": "/v1/sun?time=2024-06-21T12:00:00Z&latitude_deg=48&longitude_deg=11",
     "/v1/render": "/v1/render?output.width=16&output.height=16",
 }
@@ -144,11 +177,70 @@ def test_every_call_answers(daemon, path, method):
     assert answer.headers["Content-Type"].split(";")[0] in response["content"]
     for header in response.get("headers", {}):
         assert answer.headers[header], header
-    schema = response["content"][answer.headers["Content-Type"].split(";")[0]].get("schema", {})
-    if "$ref" in schema:
-        schema = CONTRACT["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]]
-    for required in schema.get("required", []):
-        assert required in answer.json
+    schema = response["content"][answer.headers["Content-Type"].split(";")[0]].get("schema")
+    if schema:
+        assert_conforms(answer.json, schema)
+
+
+def names_of(value):
+    return {name: names_of(inner) for name, inner in value.items()} if isinstance(value, dict) else None
+
+
+def names_in(schema):
+    schema = resolve(schema)
+    properties = dict(schema.get("properties", {}))
+    for part in schema.get("allOf", []):
+        properties.update(resolve(part).get("properties", {}))
+    return {name: names_in(inner) for name, inner in properties.items()} if properties else None
+
+
+@pytest.mark.parametrize("shading", ["solved", "paper", "montecarlo"])
+def test_slab_answers_conform(daemon, shading):
+    """Every answer holds what the contract describes and nothing else; that of photons holds all of it."""
+    answer = daemon.get(f"/v1/slab?thickness_m=100&shading={shading}" + ("&photons=1000" if shading == "montecarlo" else "")).json
+    schema = {"$ref": "#/components/schemas/Slab"}
+    assert_conforms(answer, schema)
+    described, found = names_in(schema), names_of(answer)
+    if shading != "montecarlo":
+        for name in ("photons", "seed", "standard_error"):
+            del described[name]
+    assert found == described
+
+
+def slab_parameters():
+    for reference in CONTRACT["paths"]["/v1/slab"]["get"]["parameters"]:
+        parameter = CONTRACT["components"]["parameters"][reference["$ref"].rsplit("/", 1)[1]]
+        if parameter["in"] == "query" and parameter["name"] != "members":
+            yield pytest.param(parameter["name"], parameter["schema"], id=parameter["name"])
+
+
+@pytest.mark.parametrize("name, schema", slab_parameters())
+def test_slab_parameters(daemon, name, schema):
+    """Ranges, choices, lengths and defaults as described."""
+    needed = {} if name in ("optical_thickness", "thickness_m") else {"optical_thickness": 2}
+    if name in ("photons", "seed"):
+        needed["shading"] = "montecarlo"
+
+    def check(value):
+        text = ",".join(map(str, value)) if isinstance(value, list) else value
+        answer = daemon.head("/v1/slab?" + "&".join(f"{n}={v}" for n, v in {**needed, name: text}.items()))
+        return answer.status, answer.headers["ETag"]
+
+    item = schema.get("items", schema)
+    wrap = (lambda value: [value]) if "items" in schema else (lambda value: value)
+    for choice in schema.get("enum", []):
+        assert check(choice)[0] == 200
+    assert check("other")[0] == 422
+    if "maximum" in item:
+        low, high = item.get("minimum", item.get("exclusiveMinimum")), item["maximum"]
+        assert check(wrap(high))[0] == 200
+        assert check(wrap(low))[0] == (200 if "minimum" in item else 422)
+        assert check(wrap(high + step(item, high)))[0] == check(wrap(low - step(item, low)))[0] == 422
+    if "maxItems" in schema:
+        assert check([0] * schema["maxItems"])[0] == 200 and check([0] * (schema["maxItems"] + 1))[0] == 422
+    if "default" in schema:
+        plain = daemon.head("/v1/slab?" + "&".join(f"{n}={v}" for n, v in needed.items())).headers["ETag"]
+        assert check(schema["default"]) == (200, plain)
 
 
 def test_served_contract_is_the_file(daemon):

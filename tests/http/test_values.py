@@ -58,6 +58,30 @@ def test_zenith_of_the_fit(daemon):
     assert daemon.get("/v1/optics?clouds.seed=5&dsd.gamma=0").pointers == {"/clouds/seed", "/dsd/gamma"}
 
 
+@pytest.mark.parametrize("droplets", ["dsd.gamma=2", "dsd.gamma=9&dsd.effective_radius_um=12&dsd.n0_per_cm3=80", "model.optics=paper"])
+@pytest.mark.parametrize("zenith", [0, 37, 60])
+def test_fit_describes_a_slab_of_these_droplets(daemon, droplets, zenith):
+    """Appendix A of the paper with the answer's own numbers, lengths in metres, against the solver."""
+    fit = daemon.get(f"/v1/optics?{droplets}&sun_zenith_deg={zenith}").json["paper_fit"]
+    assert fit["sun_zenith_deg"] == zenith
+    for metres in (5, 30, 150, 800):
+        solved = daemon.get(f"/v1/slab?{droplets}&sun_zenith_deg={zenith}&thickness_m={metres}&orders=modified").json
+        b, c, beta, depth = fit["b"], fit["c"], fit["beta"], fit["kappa_c"] * metres
+        total = (b + (1 - b) * math.exp(-c * metres)) * beta / (metres - (metres - 1) * beta)
+        assert math.isclose(total, 1 - solved["reflectance"][1], abs_tol=0.015)
+        once = {"t1": fit["t"] * depth * math.exp(-depth), "r1": fit["r"] / 2 * (1 - math.exp(-2 * depth))}
+        for name, value in once.items():
+            assert math.isclose(value, solved["orders"][name][1], abs_tol=0.025), name
+
+
+def test_lengths_of_the_fit_go_with_the_droplets(daemon):
+    one, four = (daemon.get(f"/v1/optics?dsd.n0_per_cm3={n0}").json["paper_fit"] for n0 in (100, 400))
+    for name in ("c", "kappa_c"):
+        assert math.isclose(four[name], 4 * one[name], rel_tol=0.02)
+    for name in ("b", "t", "r"):
+        assert math.isclose(four[name], one[name], rel_tol=0.02)
+
+
 def test_sun(daemon):
     """The worked example of NREL/TP-560-34302."""
     sun = daemon.get("/v1/sun?time=2003-10-17T12:30:30-07:00&latitude_deg=39.742476&longitude_deg=-105.1786").json

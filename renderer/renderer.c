@@ -114,7 +114,6 @@ struct renderer *renderer_create(const struct renderer_params *params)
 						.platform = gl->platform,
 						.software = gl->software,
 						.max_texture_size = gl->max_texture_size};
-	renderer->context.kernel = params->kernel;
 	renderer->context.droplets = params->droplets;
 	renderer->context.cache = cache_create(params->cache_bytes ? params->cache_bytes : DEFAULT_CACHE_BYTES);
 	if (!renderer->context.cache)

@@ -1,7 +1,7 @@
 /* The renderer: scenes in, pixels out. Knows no HTTP, no JSON and no image files.
  *
  * One thread owns a renderer and its OpenGL context: renderer_create, renderer_render and renderer_destroy are called by that
- * thread alone. renderer_info and renderer_kernel may be read by any thread after creation.
+ * thread alone. renderer_info may be read by any thread after creation.
  */
 #ifndef STRATUS_RENDERER_RENDERER_H
 #define STRATUS_RENDERER_RENDERER_H
@@ -22,7 +22,6 @@ struct renderer_params {
 	bool require_gpu;               /* refuse software rendering */
 	enum pass_kind pass_kind;       /* how full-screen passes run; PASS_AUTO measures at start */
 	const char *shader_dir;         /* read shaders from here instead of the embedded ones; NULL: embedded */
-	const struct kernel *kernel;    /* Mie kernel table; must outlive the renderer */
 	struct droplet_store *droplets; /* their tables; must outlive the renderer */
 	size_t cache_bytes;             /* bound of what the stages remember on the GPU; 0: 256 MiB */
 };

@@ -31,7 +31,7 @@ struct scene_block {
 	float extinction_modified[4]; /* kappa_S, 1/m; - */
 	float extinction_scaled[4];   /* of what does not go straight on, 1/m: (1 - f) kappa when solved, else kappa_S; q of thick layers */
 	float slab_slice_range[4];    /* slices: coordinate of the first; slices per unit of it; slices a side; planes of all */
-	float slab_light[4]; /* 1 where the sun lights: top; base; length over which thickness evens out, m; (1-g) kappa, 550 nm */
+	float slab_light[4];          /* 1 where the sun lights: top; base; length over which thickness evens out, m; (1-g) kappa, 550 nm */
 	float sky_irradiance_cloud[4];  /* clear sky on a horizontal plane at the top of the layer, W/m2/nm */
 	float sky_irradiance_ground[4]; /* the same at the ground, without clouds */
 	float air_below[4];             /* share of a clear sky's light that the clouds leave to the air beneath them, 0..1 */

@@ -88,7 +88,6 @@ static bool start(struct render_thread *thread)
 		.require_gpu = config->require_gpu,
 		.pass_kind = (enum pass_kind)config->pass_kind,
 		.shader_dir = config->shader_dir,
-		.kernel = thread->kernel,
 		.droplets = thread->droplets,
 		.cache_bytes = (size_t)config->cache_mb << 20,
 	};

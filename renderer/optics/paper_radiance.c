@@ -11,17 +11,17 @@ enum { N = PAPER_NODE_COUNT };
 #define COSINE_MIN 1e-6
 #define DEPTH_MAX  1e9
 
-/* --- light scattered twice ----------------------------------------------------------------------------------------------------- */
+/* --- fluxes of the orders' shapes ---------------------------------------------------------------------------------------------- */
 
-/* By the addition theorem: sum (2l+1) chi_l^2 P_l(mu_l) P_l(+-mu_v). 200 terms are plenty for what is integrated next. */
-static void average_phase2(const struct optics *optics, int band, double mu_l, double mu_v, double average[SLAB_SIDE_COUNT])
+/* By the addition theorem: sum (2l+1) chi_l^order P_l(mu_l) P_l(+-mu_v). 200 terms are plenty for what is integrated next. */
+static void average_phase(const struct optics *optics, int band, int order, double mu_l, double mu_v, double average[SLAB_SIDE_COUNT])
 {
 	enum { TERMS = 200 };
 	int terms = optics->moment_count < TERMS ? optics->moment_count : TERMS;
 	double a0 = 1, a1 = mu_l, b0 = 1, b1 = mu_v, sum[2] = {0};
 	for (int l = 0; l < terms; l++) {
 		double chi = optics->moment_modified[band][l];
-		sum[l % 2] += (2 * l + 1) * chi * chi * a0 * b0;
+		sum[l % 2] += (2 * l + 1) * (order == 2 ? chi * chi : chi) * a0 * b0;
 		double a2 = ((2 * l + 3) * mu_l * a1 - (l + 1) * a0) / (l + 2);
 		double b2 = ((2 * l + 3) * mu_v * b1 - (l + 1) * b0) / (l + 2);
 		a0 = a1, a1 = a2, b0 = b1, b1 = b2;
@@ -30,32 +30,32 @@ static void average_phase2(const struct optics *optics, int band, double mu_l, d
 	average[SLAB_REFLECTED] = fmax(0, sum[0] - sum[1]);
 }
 
-void paper_double_init(struct paper_double *nodes, const struct optics *optics, int band, double mu_l)
+void paper_shape_init(struct paper_shape *shape, const struct optics *optics, int band, int order, double mu_l)
 {
-	nodes->mu_l = fmin(fmax(mu_l, COSINE_MIN), 1);
-	quadrature_gauss(N, nodes->mu, nodes->weight);
+	shape->mu_l = fmin(fmax(mu_l, COSINE_MIN), 1);
+	quadrature_gauss(N, shape->mu, shape->weight);
 	for (int i = 0; i < N; i++) {
 		double average[SLAB_SIDE_COUNT];
-		average_phase2(optics, band, nodes->mu_l, nodes->mu[i], average);
+		average_phase(optics, band, order, shape->mu_l, shape->mu[i], average);
 		for (int side = 0; side < SLAB_SIDE_COUNT; side++)
-			nodes->phase[side][i] = average[side];
+			shape->phase[side][i] = average[side];
 	}
 }
 
-double paper_double_flux(const struct paper_double *nodes, enum slab_side side, double tau_modified)
+double paper_shape_flux(const struct paper_shape *shape, enum slab_side side, double tau_modified)
 {
 	double sum = 0;
 	for (int i = 0; i < N; i++) {
-		double depth, geometry = slab_single_geometry(side, tau_modified, nodes->mu_l, nodes->mu[i], &depth);
-		/* 2 pi mu dmu of the radiance P_2/(4 pi) geometry, over mu_l. */
-		sum += nodes->weight[i] * nodes->mu[i] * nodes->phase[side][i] * geometry;
+		double depth, geometry = slab_single_geometry(side, tau_modified, shape->mu_l, shape->mu[i], &depth);
+		/* 2 pi mu dmu of the radiance P/(4 pi) geometry, over mu_l. */
+		sum += shape->weight[i] * shape->mu[i] * shape->phase[side][i] * geometry;
 	}
-	return sum / (2 * nodes->mu_l);
+	return sum / (2 * shape->mu_l);
 }
 
-double paper_double_scale(const struct paper_double *nodes, enum slab_side side, double tau_modified, const struct paper_orders *orders)
+double paper_shape_scale(const struct paper_shape *shape, enum slab_side side, double tau_modified, const struct paper_orders *orders)
 {
-	double flux = paper_double_flux(nodes, side, tau_modified), wanted = side == SLAB_REFLECTED ? orders->r[2] : orders->t[2];
+	double flux = paper_shape_flux(shape, side, tau_modified), wanted = side == SLAB_REFLECTED ? orders->r[2] : orders->t[2];
 	return flux > 1e-12 ? fmin(wanted / flux, PAPER_SCALE_MAX) : 0;
 }
 
@@ -79,11 +79,11 @@ void paper_layer_init(struct paper_layer *layer, const struct paper_fit_table *t
 {
 	*layer = (struct paper_layer){optics, forward, band, fmin(fmax(tau, 0), DEPTH_MAX), fmin(fmax(mu_l, 0), 1), .orders = {.t = {0}}};
 	layer->orders = paper_layer_orders(table, optics, band, layer->tau, layer->mu_l);
-	struct paper_double nodes;
-	paper_double_init(&nodes, optics, band, layer->mu_l);
+	struct paper_shape nodes;
+	paper_shape_init(&nodes, optics, band, 2, layer->mu_l);
 	for (int side = 0; side < SLAB_SIDE_COUNT; side++)
 		layer->double_scale[side] =
-			paper_double_scale(&nodes, (enum slab_side)side, modified_share(optics, band) * layer->tau, &layer->orders);
+			paper_shape_scale(&nodes, (enum slab_side)side, modified_share(optics, band) * layer->tau, &layer->orders);
 }
 
 /* --- light of the forward peak ------------------------------------------------------------------------------------------------- */

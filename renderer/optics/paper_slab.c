@@ -1,7 +1,5 @@
 #include "renderer/optics/paper_slab.h"
 
-#include "renderer/optics/paper_fit.h"
-
 #include <math.h>
 
 /* Thicker is as good as infinite, and its square does not overflow. */
@@ -71,16 +69,4 @@ struct paper_orders paper_orders_at(const struct paper_fit *fit, double thicknes
 	share_out(orders.t, orders.t_total - orders.t[0]);
 	share_out(orders.r, orders.r_total);
 	return orders;
-}
-
-struct paper_fit paper_fit_at(double zenith_rad)
-{
-	const struct paper_fit_table table = paper_fit_table_published();
-	return paper_fit_table_at(&table, zenith_rad);
-}
-
-double paper_spherical_transmittance(double thickness_m)
-{
-	const struct paper_fit_table table = paper_fit_table_published();
-	return paper_fit_table_spherical(&table, thickness_m);
 }

@@ -28,11 +28,4 @@ struct paper_orders paper_orders_at(const struct paper_fit *fit, double thicknes
 /* Total transmittance T_ms alone, 0..1. */
 double paper_transmittance(const struct paper_fit *fit, double thickness_m);
 
-/* --- appendix B by similarity in one extinction; to go when the view stage and /v1/optics take a paper_fit_table ------------------ */
-
-#define PAPER_EXTINCTION_PER_M          0.0388
-#define PAPER_MODIFIED_EXTINCTION_PER_M 0.0252
-struct paper_fit paper_fit_at(double zenith_rad);
-double paper_spherical_transmittance(double thickness_m);
-
 #endif

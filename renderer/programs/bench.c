@@ -191,7 +191,6 @@ int main(int argc, char **argv)
 
 	const double begin = clock_milliseconds();
 	struct kernel *kernel = kernel_load(kernel_path);
-	params.kernel = kernel;
 	params.droplets = kernel ? droplet_store_create(&(struct droplet_store_params){.kernel = kernel}) : NULL;
 	struct renderer *renderer = params.droplets ? renderer_create(&params) : NULL;
 	if (!renderer)

@@ -21,7 +21,8 @@ static void droplets_destroy(void *value)
 		return;
 	texture_finish(&droplets->events);
 	texture_finish(&droplets->phase);
-	droplet_tables_destroy((struct droplet_tables *)droplets->tables);
+	if (droplets->tables)
+		droplet_store_release(droplets->store, droplets->tables);
 	free(droplets);
 }
 
@@ -105,7 +106,8 @@ static struct droplets *droplets_create(const struct stage_context *context, con
 	struct droplets *droplets = calloc(1, sizeof *droplets);
 	if (!droplets)
 		return NULL;
-	droplets->tables = droplet_tables_create(context->kernel, &scene->dsd, scene->model.optics, 2);
+	droplets->store = context->droplets;
+	droplets->tables = droplet_store_get(droplets->store, &scene->dsd, scene->model.optics, NULL);
 	if (!droplets->tables || !upload_phase(droplets) || !upload_events(droplets)) {
 		log_error("optics: out of memory");
 		droplets_destroy(droplets);

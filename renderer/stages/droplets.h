@@ -4,13 +4,14 @@
 #ifndef STRATUS_RENDERER_STAGES_DROPLETS_H
 #define STRATUS_RENDERER_STAGES_DROPLETS_H
 
-#include "renderer/optics/droplet_tables.h"
+#include "renderer/droplet_store.h"
 #include "renderer/stages/stage.h"
 
 /* The event table of shaders/lib/optics.glsl. */
 enum { EVENT_TABLE_WIDTH = 512, EVENT_TABLE_DEPTHS = 32 };
 
 struct droplets {
+	struct droplet_store *store; /* that holds the tables for this */
 	const struct droplet_tables *tables;
 	struct texture phase; /* log2 of P and P_2 over the columns of droplet_tables */
 	struct texture

@@ -16,7 +16,6 @@ struct stage_context {
 	struct cache *cache;
 	struct scene_block block;
 	unsigned block_buffer; /* OpenGL name of the uniform buffer */
-	const struct kernel *kernel;
 	struct droplet_store *droplets;
 	bool reused; /* set false by a stage that computed anything */
 };

@@ -29,7 +29,7 @@ static struct droplet_store *droplets;
 static inline struct renderer *create_renderer(size_t cache_bytes)
 {
 	const struct renderer_params params = {
-		.device_index = -1, .pass_kind = PASS_FRAGMENT, .kernel = kernel, .droplets = droplets, .cache_bytes = cache_bytes};
+		.device_index = -1, .pass_kind = PASS_FRAGMENT, .droplets = droplets, .cache_bytes = cache_bytes};
 	return renderer_create(&params);
 }
 

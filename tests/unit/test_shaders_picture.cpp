@@ -82,6 +82,7 @@ struct picture {
 struct pipeline {
 	gl_context *gl;
 	kernel *optics_kernel;
+	droplet_store *store;
 	stage_context context;
 	ground_stage ground;
 	sky_stage sky;
@@ -106,7 +107,7 @@ static void start(pass_kind kind)
 {
 	const pass_compiler compiler = {kind, nullptr};
 	shared.context.cache = cache_create(256u << 20);
-	shared.context.kernel = shared.optics_kernel;
+	shared.context.droplets = shared.store;
 	glCreateBuffers(1, &shared.context.block_buffer);
 	glNamedBufferStorage(shared.context.block_buffer, sizeof shared.context.block, nullptr, GL_DYNAMIC_STORAGE_BIT);
 	assert_true(ground_stage_init(&shared.ground, &compiler) && sky_stage_init(&shared.sky, &compiler));
@@ -370,7 +371,11 @@ int main()
 	if (!shared.gl)
 		return 77;
 	shared.optics_kernel = kernel_load(path ? path : "build/mie.kernel");
-	const int failed = shared.optics_kernel ? cmocka_run_group_tests(tests, nullptr, nullptr) : 1;
+	droplet_store_params params = {};
+	params.kernel = shared.optics_kernel;
+	shared.store = shared.optics_kernel ? droplet_store_create(&params) : nullptr;
+	const int failed = shared.store ? cmocka_run_group_tests(tests, nullptr, nullptr) : 1;
+	droplet_store_destroy(shared.store);
 	kernel_destroy(shared.optics_kernel);
 	gl_context_destroy(shared.gl);
 	return failed;

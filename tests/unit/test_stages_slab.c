@@ -218,7 +218,9 @@ int main(void)
 	struct gl_context *gl = gl_context_create(-1, false);
 	if (!gl)
 		return 77;
-	context.kernel = kernel;
+	context.droplets = droplet_store_create(&(struct droplet_store_params){.kernel = kernel, .memory_bytes = 1});
+	if (!context.droplets)
+		return 1;
 	context.cache = cache_create(64u << 20);
 	glCreateBuffers(1, &context.block_buffer);
 	glNamedBufferStorage(context.block_buffer, sizeof context.block, NULL, GL_DYNAMIC_STORAGE_BIT);
@@ -231,6 +233,7 @@ int main(void)
 	cache_destroy(context.cache);
 	glDeleteBuffers(1, &context.block_buffer);
 	gl_context_destroy(gl);
+	droplet_store_destroy(context.droplets);
 	kernel_destroy(kernel);
 	return failed;
 }

@@ -392,6 +392,7 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	frame->radiosity_passes = job.light.passes;
 	frame->radiosity_residual = job.light.residual;
 	texture_finish(&job.developed);
+	droplets_release(&renderer->context);
 	if (result != RENDER_OK) {
 		if (result == RENDER_OUT_OF_MEMORY)
 			log_error("renderer: out of memory");

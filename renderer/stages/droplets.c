@@ -21,8 +21,6 @@ static void droplets_destroy(void *value)
 		return;
 	texture_finish(&droplets->events);
 	texture_finish(&droplets->phase);
-	if (droplets->tables)
-		droplet_store_release(droplets->store, droplets->tables);
 	free(droplets);
 }
 
@@ -101,14 +99,13 @@ static bool upload_events(struct droplets *droplets)
 	return ok;
 }
 
-static struct droplets *droplets_create(const struct stage_context *context, const struct scene *scene)
+static struct droplets *droplets_create(const struct stage_context *context)
 {
 	struct droplets *droplets = calloc(1, sizeof *droplets);
 	if (!droplets)
 		return NULL;
-	droplets->store = context->droplets;
-	droplets->tables = droplet_store_get(droplets->store, &scene->dsd, scene->model.optics, NULL);
-	if (!droplets->tables || !upload_phase(droplets) || !upload_events(droplets)) {
+	droplets->tables = context->tables;
+	if (!upload_phase(droplets) || !upload_events(droplets)) {
 		log_error("optics: out of memory");
 		droplets_destroy(droplets);
 		return NULL;
@@ -137,20 +134,32 @@ static void fill_block(struct scene_block *block, const struct scene *scene, con
 	block->extinction_scaled[3] = (float)tables->slab->band[1].extrapolation;
 }
 
+void droplets_release(struct stage_context *context)
+{
+	if (context->tables)
+		droplet_store_release(context->droplets, context->tables);
+	context->tables = NULL;
+}
+
 const struct droplets *droplets_get(struct stage_context *context, const struct scene *scene)
 {
+	enum droplet_source source;
+	droplets_release(context);
+	context->tables = droplet_store_get(context->droplets, &scene->dsd, scene->model.optics, &source);
+	if (!context->tables)
+		return NULL;
+	context->reused = context->reused && source == DROPLETS_FROM_MEMORY;
 	struct cache_key key = cache_key_make("droplets");
 	droplets_key_add(&key, scene);
 	struct droplets *droplets = cache_find(context->cache, &key);
 	if (!droplets) {
 		context->reused = false;
-		droplets = droplets_create(context, scene);
-		if (!droplets)
-			return NULL;
-		const size_t bytes = texture_bytes(&droplets->phase) + texture_bytes(&droplets->events) + droplets->tables->bytes;
-		if (!cache_keep(context->cache, &key, droplets, bytes, droplets_destroy))
+		droplets = droplets_create(context);
+		if (!droplets || !cache_keep(context->cache, &key, droplets,
+					     texture_bytes(&droplets->phase) + texture_bytes(&droplets->events), droplets_destroy))
 			return NULL;
 	}
+	droplets->tables = context->tables;
 	fill_block(&context->block, scene, droplets->tables);
 	return droplets;
 }

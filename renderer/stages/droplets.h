@@ -11,15 +11,16 @@
 enum { EVENT_TABLE_WIDTH = 512, EVENT_TABLE_DEPTHS = 32 };
 
 struct droplets {
-	struct droplet_store *store; /* that holds the tables for this */
-	const struct droplet_tables *tables;
-	struct texture phase; /* log2 of P and P_2 over the columns of droplet_tables */
+	const struct droplet_tables *tables; /* held for this frame only: the store, not the GPU's memory, decides what stays */
+	struct texture phase;                /* log2 of P and P_2 over the columns of droplet_tables */
 	struct texture
 		events; /* over angle and depth, on each other: forward peak, forward blur, residual of reflection and transmission */
 };
 
-/* Owned by the cache and valid for this frame. NULL (and a log line) when out of memory. Fills the block's extinctions. */
+/* Owned by the cache and valid until droplets_release, once after every frame. NULL (and a log line) when out of memory. Fills the block's
+ * extinctions. */
 const struct droplets *droplets_get(struct stage_context *context, const struct scene *scene);
+void droplets_release(struct stage_context *context);
 
 /* Appends what droplets depend on. */
 void droplets_key_add(struct cache_key *key, const struct scene *scene);

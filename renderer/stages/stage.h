@@ -17,7 +17,8 @@ struct stage_context {
 	struct scene_block block;
 	unsigned block_buffer; /* OpenGL name of the uniform buffer */
 	struct droplet_store *droplets;
-	bool reused; /* set false by a stage that computed anything */
+	const struct droplet_tables *tables; /* of the frame's droplets, held (droplets_get, droplets_release) */
+	bool reused;                         /* set false by a stage that computed anything */
 };
 
 /* Makes the block as it stands visible to the passes that follow. */

@@ -51,6 +51,9 @@ vec3 event_at(float part, float column, float row)
 	return vec3(textureLod(event_table, (vec2(column, part * EVENT_DEPTHS + row) + 0.5) / EVENT_TABLE_SIZE, 0.0));
 }
 
+// The tables' first depth; in thinner layers the peak goes with the square of the depth and the blur with the depth.
+const float FORWARD_DEPTH_MIN = 0.06349206;
+
 float forward_row(float s)
 {
 	return clamp(s / (s + 4.0) * EVENT_DEPTHS - 0.5, 0.0, EVENT_DEPTHS - 1.0);
@@ -63,12 +66,13 @@ vec3 forward_peak(vec2 half_angle, float s)
 	float angle = 2.0 * half_angle.x * (1.0 + half_angle.x * half_angle.x * (1.0 / 6.0));
 	float unit = sqrt(min(angle / FORWARD_PEAK_REACH, 1.0));
 	vec3 peak = event_at(0.0, unit * (FORWARD_PEAK_WIDTH - 1.0), forward_row(s));
-	return unit < 1.0 && half_angle.x < half_angle.y ? peak : vec3(0.0);
+	float thin = min(s / FORWARD_DEPTH_MIN, 1.0);
+	return unit < 1.0 && half_angle.x < half_angle.y ? peak * (thin * thin) : vec3(0.0);
 }
 
 // What forward events of a path of optical length s add to the phase function of its one other event.
 vec3 forward_blur(vec2 half_angle, float s)
 {
-	return event_at(1.0, phase_unit(half_angle) * (FORWARD_BLUR_WIDTH - 1.0), forward_row(s));
+	return event_at(1.0, phase_unit(half_angle) * (FORWARD_BLUR_WIDTH - 1.0), forward_row(s)) * min(s / FORWARD_DEPTH_MIN, 1.0);
 }
 #endif

@@ -153,6 +153,7 @@ static void phase_columns_round_trip(void **)
 	assert_near(EVENT_DEPTHS, EVENT_TABLE_DEPTHS, 0);
 	assert_near(FORWARD_PEAK_REACH, FORWARD_ANGLE_MAX, 1e-7);
 	assert_near(FORWARD_PEAK_WIDTH, FORWARD_ANGLE_COUNT, 0);
+	assert_near(FORWARD_DEPTH_MIN, forward_depth_at(0.5 / FORWARD_DEPTH_COUNT), 1e-7);
 	assert_near(FORWARD_BLUR_WIDTH, BLUR_ANGLE_COUNT, 0);
 	assert_near(SLAB_TABLE_SIZE.x, SLAB_TABLE_WIDTH, 0);
 	assert_near(SLAB_TABLE_SIZE.y, SLAB_TABLE_HEIGHT, 0);

@@ -117,6 +117,7 @@ static void start(pass_kind kind)
 
 static void stop()
 {
+	droplets_release(&shared.context);
 	view_stage_finish(&shared.view);
 	radiosity_stage_finish(&shared.radiosity);
 	field_stage_finish(&shared.field);

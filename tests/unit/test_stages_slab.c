@@ -230,6 +230,7 @@ int main(void)
 		cmocka_unit_test(horizon_is_finite),
 	};
 	const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+	droplets_release(&context);
 	cache_destroy(context.cache);
 	glDeleteBuffers(1, &context.block_buffer);
 	gl_context_destroy(gl);

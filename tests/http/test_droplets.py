@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from conftest import SANITIZED, wait_for
+from conftest import wait_for
 
 SMALL = {"width": 16, "height": 16}
 
@@ -95,22 +95,6 @@ def test_other_skies_go_on(daemon):
           f" {statistics.median(computing):.3f} s")
     assert len(taken) > 3 * len(answers)
     assert statistics.median(taken) < statistics.median(computing) / 2
-
-
-def test_those_who_wait_for_the_same_do_not_wait_for_others(daemon):
-    """One new distribution asked for twice, and four others in between: both come before the last."""
-    ended = {}
-    scenes = [scene(5.0), *(scene(5.1 + i / 10) for i in range(4)), scene(5.0)]
-
-    def ask(i):
-        time.sleep(0.005 * i)
-        answer = daemon.render(scenes[i])
-        ended[i] = time.monotonic()
-        return answer.status
-
-    with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
-        assert set(pool.map(ask, range(len(scenes)))) == {200}
-    assert ended[5] < ended[4]
 
 
 def test_kept_on_disk(restart):

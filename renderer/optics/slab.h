@@ -4,10 +4,11 @@
  * tau' = (1-f) tau. Orders 2 and more of (P_D, tau') come from adding-doubling with 32 streams, one azimuthal mode at a time
  * (renderer/optics/slab_layer.h). The first order is exact in the angle, after T. Nakajima and M. Tanaka 1988, JQSRT 40, 51, extended so
  * that it holds the aureole as well:
- *   reflected    F0/(4 pi) mu_l/(mu_l+mu_v) (1 - exp(-s))  [P/(1-f) + C_r(Theta, s)],   s = tau'/mu_l + tau'/mu_v
- *   transmitted  F0/(4 pi) mu_l/(mu_l-mu_v) (exp(-tau'/mu_l) - exp(-tau'/mu_v)) [exp(-x) P/(1-f) + C_t(Theta, s)],
- *                x = s f/(1-f), s: mean slant depth tau'
- * C_r and C_t put what delta-M took out back exactly once (renderer/optics/slab_residual.h); both vanish in thin layers.
+ *   reflected    F0/(4 pi) mu_l/(mu_l+mu_v) (1 - exp(-s))  [S_r P/(1-f) + C_r(Theta, s)],   s = tau'/mu_l + tau'/mu_v
+ *   transmitted  F0/(4 pi) mu_l/(mu_l-mu_v) (exp(-tau'/mu_l) - exp(-tau'/mu_v)) [S_t P/(1-f) + C_t(Theta, s)],
+ *                s: mean slant depth tau'
+ * C_r and C_t put what delta-M took out back exactly once (renderer/optics/slab_residual.h); both vanish in thin layers, where S_r and S_t
+ * are 1.
  *
  * Units and conventions. tau: vertical optical thickness of the full phase function, >= 0; above SLAB_DEPTH_MAX by the asymptotic theory of
  * thick conservative layers. mu_l, mu_v: cosines 0..1 of sun and view with the vertical. azimuth: between the headings of the light before

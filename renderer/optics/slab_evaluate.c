@@ -195,7 +195,7 @@ double slab_radiance_single(const struct slab_solution *solution, const struct o
 	double geometry = slab_single_geometry(side, (1 - table->truncated) * clamp_depth(tau), mu_l, mu_v, &s);
 	if (!(geometry > 0))
 		return 0;
-	double sharp = side == SLAB_TRANSMITTED ? exp(-s * table->truncated / (1 - table->truncated)) : 1;
+	double sharp = slab_residual_sharp(table, side, angle, s);
 	double phase = sharp * optics_phase(optics, band, angle) / (1 - table->truncated) + slab_residual_at(table, side, angle, s);
 	return fmax(phase, 0) * geometry / (4 * M_PI);
 }

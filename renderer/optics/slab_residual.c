@@ -14,6 +14,10 @@ enum {
 	BACK_COUNT = 1536 /* angles of the back half: three and more per turn of the last P_l */
 };
 
+/* sin^2(angle/2) at 100 and 135 degrees. */
+#define BACK_FROM 0.587
+#define BACK_FULL 0.854
+
 _Static_assert(ANGLES % 16 == 0 && SLICE % 2 == 0, "whole strips, slices that begin with an even l");
 
 double slab_residual_angle(double i)
@@ -90,20 +94,38 @@ static double transmitted_factor(double s, double phi, double f, double full)
 	return exp(-x) * rest - expm1(-x) * (full - phi);
 }
 
-/* back: chi_l of the back half over 1-f. */
-static double reflected_factor(double s, double phi, double f, double back)
+/* m(a): mean of exp(-(a - 1) t) over slant depths t = 0..s, weighted with exp(-t). */
+static double mean_kept(double s, double a)
 {
-	double a = 1 + f - phi;
-	return s > 0 ? back * (expm1(-s * a) / (a * expm1(-s)) - 1) : 0;
+	return s > 0 ? expm1(-s * a) / (a * expm1(-s)) : 1;
 }
 
-/* Moments of P from l = 32 on of the back half alone, faded in between 100 and 135 degrees; the others are set to 0. By the trapezoidal
- * rule, whose error at the end is step^2/12 P(pi), the same for all. */
+/* back: beta_l/(1-f). */
+static double reflected_factor(double s, double phi, double f, double back)
+{
+	return back * (mean_kept(s, 1 + f - phi) - mean_kept(s, 1 + f));
+}
+
+static double back_share(double angle)
+{
+	double sine = sin(angle / 2);
+	return fade(sine * sine, BACK_FROM, BACK_FULL);
+}
+
+double slab_residual_sharp(const struct slab_band *band, enum slab_side side, double angle, double s)
+{
+	double f = band->truncated / (1 - band->truncated);
+	if (side == SLAB_TRANSMITTED)
+		return exp(-s * f);
+	return 1 + back_share(angle) * (mean_kept(s, 1 + f) - 1);
+}
+
+/* beta_l: moments of the part of P behind. By the trapezoidal rule, whose error at the end is step^2/12 P(pi), the same for all. */
 static void back_moments(const struct optics *optics, int band, int length, double *moment)
 {
 	double mu[BACK_COUNT], value[BACK_COUNT], legendre[2][BACK_COUNT], step = M_PI / 2 / BACK_COUNT;
 	for (int i = 0; i < BACK_COUNT; i++) {
-		double angle = M_PI - i * step, share = fade(angle, 100 * M_PI / 180, 135 * M_PI / 180);
+		double angle = M_PI - i * step, share = back_share(angle);
 		mu[i] = cos(angle);
 		value[i] = share > 0 ? share * optics_phase(optics, band, angle) * sin(angle) * step / 2 : 0;
 		legendre[0][i] = 1;
@@ -114,7 +136,7 @@ static void back_moments(const struct optics *optics, int band, int length, doub
 		for (int i = 0; i < BACK_COUNT; i += 4)
 			for (int lane = 0; lane < 4; lane++)
 				sum[lane] += value[i + lane] * now[i + lane];
-		moment[l] = l < LAYER_MOMENTS ? 0 : sum[0] + sum[1] + sum[2] + sum[3];
+		moment[l] = sum[0] + sum[1] + sum[2] + sum[3];
 		double a = (2 * l + 1) / (l + 1.0), b = l / (l + 1.0);
 		for (int i = 0; i < BACK_COUNT; i++)
 			before[i] = a * mu[i] * now[i] - b * before[i];

@@ -10,10 +10,12 @@
  * Split like this C_t is smooth: what is sharp in P was turned by one peak event alone. For thin layers it is 0, so that P/(1-f) is left:
  * Nakajima-Tanaka's TMS. Aureole and TMS are one term and not two.
  *
- * Reflected: the light is turned on its way in and out, which blurs glory and fogbow: with B_l the coefficients
- * of P of the back half alone (faded in between 100 and 135 degrees; only terms l >= 32, the others are in P_D)
- *   C_r = sum (2l+1) B_l/(1-f) [(1 - exp(-s a_l))/(a_l (1 - exp(-s))) - 1] P_l(cos Theta),   a_l = 1 + (f - phi_l)/(1-f),
- * the mean over depths of single scattering, s = tau'/mu_l + tau'/mu_v.
+ * Reflected: the light is turned on its way in and out, which blurs glory and fogbow. With B the part of P that is behind, B(Theta) P
+ * with B fading in between 100 and 135 degrees, and beta_l its coefficients,
+ *   m(a) = (1 - exp(-s a))/(a (1 - exp(-s))),   a_l = 1 + (f - phi_l)/(1-f),   s = tau'/mu_l + tau'/mu_v,
+ * m being the mean over depths of single scattering, P/(1-f) becomes
+ *   [1 + B (m(1/(1-f)) - 1)] P/(1-f) + C_r,   C_r = sum (2l+1) beta_l/(1-f) [m(a_l) - m(1/(1-f))] P_l(cos Theta).
+ * What is sharp in P was not turned at all, so that C_r is smooth here too, and its series short of the glory's details.
  */
 #ifndef STRATUS_RENDERER_OPTICS_SLAB_RESIDUAL_H
 #define STRATUS_RENDERER_OPTICS_SLAB_RESIDUAL_H
@@ -30,6 +32,10 @@ double slab_residual_depth_index(double s);
 
 /* Fills band->residual[side] for band->truncated. Any thread. */
 void slab_residual_fill(const struct optics *optics, int band, enum slab_side side, struct slab_band *result);
+
+/* S_r and S_t, the factor of P/(1-f) beside the table's value, 0..1: the share of light that P_F turned once alone, or not at all. Any
+ * thread. */
+double slab_residual_sharp(const struct slab_band *band, enum slab_side side, double angle, double s);
 
 /* The table's value at an angle and depth, by cubics through its neighbours. Any thread. */
 double slab_residual_at(const struct slab_band *band, enum slab_side side, double angle, double s);

@@ -30,6 +30,14 @@ float solved_residual_column(vec2 half_angle)
 	return (half_angle.x < half_angle.y ? x : 1.0 - x) * (EVENT_TABLE_SIZE.x - 1.0);
 }
 
+// Mean of exp(-(a - 1) t) over slant depths t = 0..s, weighted with exp(-t): what reflected light keeps of what a fuller extinction takes.
+vec3 solved_mean_kept(float s, vec3 a)
+{
+	if (s < 0.01)
+		return vec3(1.0) - 0.5 * s * (a - vec3(1.0));
+	return (vec3(1.0) - exp(-s * a)) / (a * (1.0 - exp(-s)));
+}
+
 // Phase function of the first order of scattering with all that delta-M takes out of the peak put back once: the aureole and the blur of the
 // glory. s: slant depth, scaled, of the path in and out (reflected) or the mean one (through).
 vec3 solved_first_phase(vec2 half_angle, float s, bool through)
@@ -38,6 +46,8 @@ vec3 solved_first_phase(vec2 half_angle, float s, bool through)
 	vec3 sharp = phase_full(half_angle) * ratio;
 	if (through)
 		sharp *= exp((vec3(1.0) - ratio) * s);
+	else
+		sharp *= mix(vec3(1.0), solved_mean_kept(s, ratio), smoothstep(0.587, 0.854, half_angle.x * half_angle.x));
 	return max(sharp + event_at(through ? 3.0 : 2.0, solved_residual_column(half_angle), s / (s + 4.0) * (EVENT_DEPTHS - 1.0)), vec3(0.0));
 }
 

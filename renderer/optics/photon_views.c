@@ -13,13 +13,13 @@ enum {
 /* A straight piece of a ray, as light runs along it towards the viewer; levels are distances from the side it leaves by. */
 struct leg {
 	float low, high, x, y, z, weight; /* 1/(4 pi |z|) */
-	int view;
+	int view, turns;                  /* turns between it and the viewer */
 };
 
 struct photon_views {
 	const struct photon_phase *phase;
 	double tau;
-	int view_count, azimuth_count, lane_count;
+	int view_count, azimuth_count, lane_count, order_count;
 	float *mu;
 	float *cosine, *sine, *mirror; /* per lane, of its azimuth; mirror: sign of y. All 0 for lanes that only fill a block. */
 	float *x, *y;                  /* per lane, the photon's direction turned by it */
@@ -29,15 +29,15 @@ struct photon_views {
 	struct leg *leg[SLAB_SIDE_COUNT]; /* of all views */
 	int leg_count[SLAB_SIDE_COUNT];
 	float reach[SLAB_SIDE_COUNT]; /* level that no leg passes */
-	float *sum;                   /* [side][view][lane] of this photon */
-	bool *touched;                /* [side][view] */
+	float *sum;                   /* [order][side][view][lane] of this photon */
+	bool *touched;                /* [order][side][view] */
 };
 
 /* --- memory -------------------------------------------------------------------------------------------------------------------- */
 
 static bool allocate(struct photon_views *views)
 {
-	size_t lanes = (size_t)views->lane_count, estimates = (size_t)(SLAB_SIDE_COUNT * views->view_count);
+	size_t lanes = (size_t)views->lane_count, estimates = (size_t)views->order_count * (size_t)(SLAB_SIDE_COUNT * views->view_count);
 	views->mu = calloc((size_t)views->view_count, sizeof *views->mu);
 	views->cosine = calloc(6 * lanes, sizeof *views->cosine);
 	views->bin = calloc(lanes, sizeof *views->bin);
@@ -56,11 +56,12 @@ static bool allocate(struct photon_views *views)
 }
 
 struct photon_views *photon_views_create(const struct photon_phase *phase, double tau, int view_count, const double *mu, int azimuth_count,
-					 const double *azimuth)
+					 const double *azimuth, int order_count)
 {
 	struct photon_views *views = calloc(1, sizeof *views);
 	if (views) {
-		*views = (struct photon_views){.phase = phase, .tau = tau, .view_count = view_count, .azimuth_count = azimuth_count};
+		*views = (struct photon_views){
+			.phase = phase, .tau = tau, .view_count = view_count, .azimuth_count = azimuth_count, .order_count = order_count};
 		views->lane_count = (2 * azimuth_count + BLOCK - 1) / BLOCK * BLOCK;
 	}
 	if (!views || !allocate(views)) {
@@ -109,6 +110,7 @@ static void trace_ray(struct photon_views *views, enum slab_side side, int view,
 			.z = (float)light[2],
 			.weight = (float)(1 / (4 * M_PI * fabs(light[2]))),
 			.view = view,
+			.turns = i,
 		};
 		views->reach[side] = fmaxf(views->reach[side], leg->high);
 		if (next < 0 || next > views->tau)
@@ -159,14 +161,21 @@ static void add_body(const struct photon_views *views, const struct leg *leg, fl
 	}
 }
 
-static int scatter_wide(struct photon_views *views, enum slab_side side, float level, float z)
+/* Row of estimates for light that is scattered `order` times before it is seen. */
+static int row_of(const struct photon_views *views, int order, enum slab_side side, int view)
+{
+	int slot = order < views->order_count ? order - 1 : views->order_count - 1;
+	return (slot * SLAB_SIDE_COUNT + (int)side) * views->view_count + view;
+}
+
+static int scatter_wide(struct photon_views *views, enum slab_side side, float level, float z, int order)
 {
 	int estimates = 0;
 	for (int i = 0; i < views->leg_count[side]; i++) {
 		const struct leg *leg = &views->leg[side][i];
 		if (level < leg->low || level >= leg->high)
 			continue;
-		int row = (int)side * views->view_count + leg->view;
+		int row = row_of(views, order + leg->turns, side, leg->view);
 		views->touched[row] = true;
 		float *sum = &views->sum[(size_t)row * (size_t)views->lane_count];
 		add_body(views, leg, z, sum);
@@ -190,20 +199,20 @@ static void add_peak(struct photon_views *views, int row, float mu, float z, flo
 	}
 }
 
-static int scatter_straight(struct photon_views *views, enum slab_side side, float level, float z)
+static int scatter_straight(struct photon_views *views, enum slab_side side, float level, float z, int order)
 {
 	int estimates = 0;
 	for (int view = 0; view < views->view_count; view++) {
 		float mu = views->mu[view], path = level / mu;
 		if (fabsf(mu - z) > 2 * views->phase->edge || path > 80)
 			continue;
-		add_peak(views, (int)side * views->view_count + view, mu, z, expf(-path) / ((float)(4 * M_PI) * mu));
+		add_peak(views, row_of(views, order, side, view), mu, z, expf(-path) / ((float)(4 * M_PI) * mu));
 		estimates += views->lane_count;
 	}
 	return estimates;
 }
 
-int photon_views_scatter(struct photon_views *views, double depth, const double direction[3], bool straight)
+int photon_views_scatter(struct photon_views *views, double depth, const double direction[3], bool straight, int order)
 {
 	float level[] = {(float)depth, (float)(views->tau - depth)};
 	bool seen[] = {level[0] < views->reach[0], level[1] < views->reach[1]};
@@ -218,15 +227,39 @@ int photon_views_scatter(struct photon_views *views, double depth, const double 
 	for (int side = 0; side < SLAB_SIDE_COUNT; side++) {
 		float z = (float)(side == SLAB_REFLECTED ? -direction[2] : direction[2]);
 		if (seen[side])
-			estimates += scatter_wide(views, (enum slab_side)side, level[side], z);
+			estimates += scatter_wide(views, (enum slab_side)side, level[side], z, order);
 		if (straight)
-			estimates += scatter_straight(views, (enum slab_side)side, level[side], z);
+			estimates += scatter_straight(views, (enum slab_side)side, level[side], z, order);
 	}
 	return estimates;
 }
 
-void photon_views_collect(struct photon_views *views, double *sum, double *square)
+/* Adds all orders to the first. */
+static void collect_orders(struct photon_views *views, double *order_sum)
 {
+	const int rows = SLAB_SIDE_COUNT * views->view_count;
+	for (int row = 0; row < views->order_count * rows; row++) {
+		if (!views->touched[row])
+			continue;
+		float *lane = &views->sum[(size_t)row * (size_t)views->lane_count];
+		float *first = &views->sum[(size_t)(row % rows) * (size_t)views->lane_count];
+		for (int i = 0; i < views->azimuth_count; i++)
+			order_sum[(size_t)row * (size_t)views->azimuth_count + (size_t)i] +=
+				0.5 * ((double)lane[i] + (double)lane[views->azimuth_count + i]);
+		if (row < rows)
+			continue;
+		for (int i = 0; i < views->lane_count; i++)
+			first[i] += lane[i];
+		memset(lane, 0, (size_t)views->lane_count * sizeof *lane);
+		views->touched[row % rows] = true;
+		views->touched[row] = false;
+	}
+}
+
+void photon_views_collect(struct photon_views *views, double *sum, double *square, double *order_sum)
+{
+	if (order_sum)
+		collect_orders(views, order_sum);
 	for (int row = 0; row < SLAB_SIDE_COUNT * views->view_count; row++) {
 		if (!views->touched[row])
 			continue;

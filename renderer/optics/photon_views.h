@@ -18,19 +18,21 @@
 struct photon_views;
 
 /* For one thread. tau: depth of the layer for the phase function that is tabulated. mu[view_count] is clamped to 1e-3..1,
- * azimuth[azimuth_count] radians, both read now alone; phase must outlive it. NULL (and a log line) when out of memory. */
+ * azimuth[azimuth_count] radians, both read now alone; phase must outlive it. order_count: how many numbers of scatterings are told apart,
+ * from 1. NULL (and a log line) when out of memory. */
 struct photon_views *photon_views_create(const struct photon_phase *phase, double tau, int view_count, const double *mu, int azimuth_count,
-					 const double *azimuth);
+					 const double *azimuth, int order_count);
 void photon_views_destroy(struct photon_views *views);
 
 /* Traces the rays for the next photon. */
 void photon_views_aim(struct photon_views *views, struct photon_random *random);
 
 /* Adds what a photon at a depth (downward, 0..tau) with a direction (x: heading of the sun's light, z downward) scatters. straight: it was
- * never turned by more than the peak's 5 degrees. Returns how many estimates that took. */
-int photon_views_scatter(struct photon_views *views, double depth, const double direction[3], bool straight);
+ * never turned by more than the peak's 5 degrees. order: this is its order'th scattering. Returns how many estimates that took. */
+int photon_views_scatter(struct photon_views *views, double depth, const double direction[3], bool straight, int order);
 
-/* Ends a photon: adds its estimates to sum and their squares to square, [side][view][azimuth], and forgets them. */
-void photon_views_collect(struct photon_views *views, double *sum, double *square);
+/* Ends a photon: adds its estimates to sum and their squares to square, [side][view][azimuth], and by the number of scatterings to
+ * order_sum [order][side][view][azimuth], the last order for all that follow (NULL: not), and forgets them. */
+void photon_views_collect(struct photon_views *views, double *sum, double *square, double *order_sum);
 
 #endif

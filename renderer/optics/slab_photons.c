@@ -3,6 +3,7 @@
 #include "renderer/log.h"
 #include "renderer/optics/photon_views.h"
 
+#include <limits.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -19,6 +20,7 @@ struct batch {
 	uint64_t photons, scatterings;
 	uint64_t left[SLAB_SIDE_COUNT][ORDER_COUNT]; /* photons that left, by number of scatterings */
 	double *sum, *square;                        /* of the photons' radiances, per direction */
+	double *order_sum;                           /* by order too; NULL: not wanted */
 };
 
 struct job {
@@ -30,6 +32,7 @@ struct job {
 	struct batch batch[BATCH_MAX];
 	double *values; /* memory of all sums and squares */
 	size_t value_count;
+	int order_count; /* 0 without directions */
 	atomic_int next;
 	atomic_bool stopped;
 };
@@ -72,7 +75,7 @@ static bool trace_photon(struct tracer *tracer)
 		order++;
 		int work = 1;
 		if (tracer->views)
-			work += photon_views_scatter(tracer->views, depth, direction, straight);
+			work += photon_views_scatter(tracer->views, depth, direction, straight, order < INT_MAX ? (int)order : INT_MAX);
 		struct photon_angle angle = photon_phase_draw(job->phase, random);
 		straight = straight && angle.peak;
 		photon_turn(direction, angle, random);
@@ -96,7 +99,7 @@ static bool trace_batch(struct tracer *tracer, int number)
 		if (!trace_photon(tracer))
 			return false;
 		if (tracer->views)
-			photon_views_collect(tracer->views, batch->sum, batch->square);
+			photon_views_collect(tracer->views, batch->sum, batch->square, batch->order_sum);
 		if (!goes_on(tracer, 8 * params->view_count))
 			return false;
 	}
@@ -109,8 +112,8 @@ static void *worker_main(void *argument)
 	const struct photon_params *params = job->params;
 	struct tracer tracer = {.job = job};
 	if (job->value_count > 0) {
-		tracer.views =
-			photon_views_create(job->phase, job->tau, params->view_count, params->mu_v, params->azimuth_count, params->azimuth);
+		tracer.views = photon_views_create(job->phase, job->tau, params->view_count, params->mu_v, params->azimuth_count,
+						   params->azimuth, job->order_count > 0 ? job->order_count : 1);
 		if (!tracer.views)
 			atomic_store(&job->stopped, true);
 	}
@@ -136,6 +139,8 @@ static void reduce(struct job *job)
 			total->sum[i] += batch->sum[i];
 			total->square[i] += batch->square[i];
 		}
+		for (size_t i = 0; i < (size_t)job->order_count * job->value_count; i++)
+			total->order_sum[i] += batch->order_sum[i];
 	}
 }
 
@@ -176,7 +181,9 @@ static bool fill_radiances(const struct job *job, struct photon_result *result)
 		return true;
 	result->radiance = malloc(job->value_count * sizeof *result->radiance);
 	result->radiance_error = malloc(job->value_count * sizeof *result->radiance_error);
-	if (!result->radiance || !result->radiance_error) {
+	if (job->order_count > 0)
+		result->radiance_orders = malloc((size_t)job->order_count * job->value_count * sizeof *result->radiance_orders);
+	if (!result->radiance || !result->radiance_error || (job->order_count > 0 && !result->radiance_orders)) {
 		log_error("photons: out of memory");
 		return false;
 	}
@@ -186,6 +193,8 @@ static bool fill_radiances(const struct job *job, struct photon_result *result)
 		result->radiance[i] = scale * mean;
 		result->radiance_error[i] = scale * (n > 1 ? sqrt(spread / (n - 1)) : mean);
 	}
+	for (size_t i = 0; i < (size_t)job->order_count * job->value_count; i++)
+		result->radiance_orders[i] = scale * total->order_sum[i] / n;
 	return true;
 }
 
@@ -198,9 +207,11 @@ static bool job_init(struct job *job, const struct photon_params *params)
 	*job = (struct job){.params = params, .tau = share * fmin(fmax(params->tau, 0), 1e9), .mu_l = fmin(fmax(params->mu_l, 1e-3), 1)};
 	job->scattering = -expm1(-job->tau / job->mu_l);
 	job->value_count = (size_t)SLAB_SIDE_COUNT * (size_t)params->view_count * (size_t)params->azimuth_count;
+	job->order_count = job->value_count > 0 ? params->order_count : 0;
 	job->batch_count = params->photons < BATCH_MAX ? (int)params->photons : BATCH_MAX;
+	const size_t batch_values = (2 + (size_t)job->order_count) * job->value_count;
 	job->phase = malloc(sizeof *job->phase);
-	job->values = calloc(2 * (size_t)job->batch_count * job->value_count + 1, sizeof *job->values);
+	job->values = calloc((size_t)job->batch_count * batch_values + 1, sizeof *job->values);
 	if (!job->phase || !job->values) {
 		log_error("photons: out of memory");
 		return false;
@@ -210,8 +221,9 @@ static bool job_init(struct job *job, const struct photon_params *params)
 	for (uint64_t i = 0; i < count; i++) {
 		struct batch *batch = &job->batch[i];
 		batch->photons = photons / count + (i < photons % count);
-		batch->sum = job->values + 2 * i * job->value_count;
+		batch->sum = job->values + i * batch_values;
 		batch->square = batch->sum + job->value_count;
+		batch->order_sum = job->order_count > 0 ? batch->square + job->value_count : NULL;
 	}
 	return true;
 }
@@ -258,5 +270,6 @@ void photon_result_finish(struct photon_result *result)
 		return;
 	free(result->radiance);
 	free(result->radiance_error);
+	free(result->radiance_orders);
 	*result = (struct photon_result){0};
 }

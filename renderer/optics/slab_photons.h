@@ -42,6 +42,7 @@ struct photon_params {
 	/* Directions for radiance: every mu_v with every azimuth. Counts may be 0. mu_v 0..1, clamped to at least 1e-3. */
 	int view_count, azimuth_count;
 	const double *mu_v, *azimuth;
+	int order_count; /* of radiance_orders, 0..64 */
 
 	bool (*cancelled)(void *context); /* asked every few milliseconds by every thread, several at once; may be NULL */
 	void *cancel_context;
@@ -55,6 +56,9 @@ struct photon_result {
 	/* [side][view][azimuth] at (side * view_count + view) * azimuth_count + azimuth, and the standard error: the value itself when
 	 * there was one photon, and 0 where none sent anything. malloc'd; NULL without directions. */
 	double *radiance, *radiance_error;
+	/* [order][side][view][azimuth], light scattered order + 1 times, the last as often and oftener; they add up to radiance. malloc'd;
+	 * NULL without directions or with order_count 0. */
+	double *radiance_orders;
 
 	uint64_t scatterings; /* of all photons */
 };

@@ -395,6 +395,48 @@ static void threads_agree(void **state)
 	}
 }
 
+static void check_radiance_orders(const struct optics *optics, enum slab_phase phase, double tau, double sun_deg)
+{
+	enum { ORDERS = 5 };
+	struct photon_params params = params_for(optics, tau, sun_deg, 40000);
+	add_directions(&params);
+	params.phase = phase;
+	struct photon_result plain = trace(&params);
+	assert_null(plain.radiance_orders);
+	params.order_count = ORDERS;
+	struct photon_result result = trace(&params);
+	assert_int_equal(result.scatterings, plain.scatterings);
+	const double left = 1 - optics->forward_peak_fraction[1], share = phase == SLAB_PHASE_FULL ? 1 : left;
+	for (int k = 0; k < DIRECTIONS; k++) {
+		const enum slab_side side = k / (VIEWS * AZIMUTHS);
+		const double mu_v = views[k / AZIMUTHS % VIEWS], mu_l = params.mu_l;
+		double sum = 0;
+		for (int order = 0; order < ORDERS; order++)
+			sum += result.radiance_orders[order * DIRECTIONS + k];
+		assert_near(sum, result.radiance[k], 1e-5 * sum, "sum of orders");
+		assert_near(result.radiance[k], plain.radiance[k], 1e-5 * sum, "radiance");
+		/* The first is known. */
+		const double angle = scattering_angle(side, mu_l, mu_v, azimuths[k % AZIMUTHS]);
+		const double p = angle < FORWARD_PEAK_ANGLE && phase == SLAB_PHASE_MODIFIED ? 0 : optics_phase(optics, 1, angle) / share;
+		const double a = share * tau / mu_l, b = share * tau / mu_v;
+		const double column = side == SLAB_REFLECTED ? mu_l / (mu_l + mu_v) * -expm1(-a - b)
+				      : fabs(a - b) < 1e-9   ? a * exp(-a)
+							     : mu_l / (mu_l - mu_v) * (exp(-a) - exp(-b));
+		const double expected = p / (4 * M_PI) * column, error = 5 * result.radiance_error[k] + 1e-3 * expected;
+		assert_near(result.radiance_orders[k], expected, error, "first order");
+	}
+	photon_result_finish(&plain);
+	photon_result_finish(&result);
+}
+
+static void radiance_by_orders(void **state)
+{
+	struct fixture *fixture = *state;
+	check_radiance_orders(fixture->optics[0], SLAB_PHASE_FULL, 0.8, 50);
+	check_radiance_orders(fixture->optics[0], SLAB_PHASE_MODIFIED, 2, 72);
+	check_radiance_orders(fixture->optics[2], SLAB_PHASE_FULL, 3, 20);
+}
+
 /* --- standard errors ----------------------------------------------------------------------------------------------------------- */
 
 /* Spread over seeds against what each of them reported: the mean over directions of the ratio of variances. */
@@ -715,6 +757,7 @@ int main(void)
 		cmocka_unit_test(thin_layers_scatter_once),
 		cmocka_unit_test(counts_add_up),
 		cmocka_unit_test(radiance_adds_up),
+		cmocka_unit_test(radiance_by_orders),
 		cmocka_unit_test(threads_agree),
 		cmocka_unit_test(errors_are_honest),
 		cmocka_unit_test(judges_the_solved_slab),

@@ -1,6 +1,7 @@
 # make run    installs what is missing, builds, starts the daemon
 # make test   installs what tests need, builds, runs all tests
 # make demo   four pictures into out/, with their timings
+# make validate   measures the bounds of the optics and draws the paper's figures into docs/validation/, some minutes
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
 
 SHELL := /bin/bash
@@ -24,6 +25,7 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
 	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml clang-format procps
+VALIDATE_PACKAGES := gnuplot-nox
 
 pkg = $(shell pkg-config $(1) $(2))
 RENDERER_LIBS = $(call pkg,--libs,epoxy libxxhash cminpack) -lEGL -lm
@@ -36,6 +38,7 @@ RENDERER_SRC := $(wildcard renderer/*.c renderer/optics/*.c renderer/gl/*.c rend
 SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c))
 CLIENT_SRC := $(wildcard clients/*.c)
 UNIT_SRC := $(wildcard tests/unit/test_*.c)
+VALIDATE_SRC := $(wildcard tests/validate/*.c)
 UNIT_CXX := $(wildcard tests/unit/test_*.cpp)
 SHADERS := $(wildcard shaders/*.glsl shaders/*/*.glsl)
 RESOURCES := openapi.yaml server/pages/index.html $(wildcard server/presets/*.json)
@@ -45,7 +48,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel run test demo unit http format clean packages test-packages
+.PHONY: all programs kernel run test demo validate unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -77,6 +80,9 @@ $(B)/render-bench: $(call obj,renderer/programs/bench.c) $(B)/librenderer.a
 	$(CC) $(LDFLAGS) $^ -o $@ $(RENDERER_LIBS) -ldl
 $(B)/stratus-image.so: $(call obj,renderer/image/oiio.cpp) $(B)/pic/renderer/scene.c.o
 	$(CXX) $(LDFLAGS) -shared $^ -o $@ $(call pkg,--libs,OpenImageIO zlib)
+
+$(B)/stratus-validate: $(call obj,$(VALIDATE_SRC)) $(B)/librenderer.a
+	$(CC) $(LDFLAGS) $^ -o $@ $(call pkg,--libs,jansson) $(RENDERER_LIBS)
 
 $(B)/%.c.o: %.c
 	@mkdir -p $(@D)
@@ -115,10 +121,11 @@ $(B)/gen/%.o: $(B)/gen/%.S
 
 $(B)/tests/%: tests/unit/%.c $(B)/libserver.a $(B)/librenderer.a
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) $(CFLAGS) -MF $@.d $< $(B)/libserver.a $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(SERVER_LIBS) $(RENDERER_LIBS)
+	$(CC) $(CPPFLAGS) $(CFLAGS) -MF $@.d $< $(filter %.o,$^) $(B)/libserver.a $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(SERVER_LIBS) $(RENDERER_LIBS)
 $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(RENDERER_LIBS)
+$(B)/tests/test_validate_bounds: $(call obj,tests/validate/bounds.c)
 
 -include $(shell find $(B) -name '*.d' 2>/dev/null)
 
@@ -139,6 +146,11 @@ demo: packages
 test: test-packages
 	@$(MAKE) --no-print-directory -j$$(nproc) programs unit && $(MAKE) --no-print-directory kernel
 	@scripts/test.sh $(B)
+
+validate: packages
+	@scripts/packages.sh $(VALIDATE_PACKAGES)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(B)/stratus-validate && $(MAKE) --no-print-directory kernel
+	@scripts/validate.sh $(B)
 
 unit: $(UNIT)
 

@@ -72,15 +72,30 @@ static double residual_angle(int column)
 	return unit < 1 ? 2 * asin(unit * unit * M_SQRT1_2) : 2 * acos((2 - unit) * (2 - unit) * M_SQRT1_2);
 }
 
-static void fill_residual(const struct slab_solution *slab, enum slab_side side, event_row *rows)
+/* Scaled optical thickness of a band over that at 550 nm. */
+static double depth_ratio(const struct droplet_tables *tables, int band)
 {
-	for (int band = 0; band < BAND_COUNT; band++)
+	const struct slab_band *own = &tables->slab->band[band], *middle = &tables->slab->band[1];
+	return tables->optics->extinction_per_m[band] * (1 - own->truncated) /
+	       (tables->optics->extinction_per_m[1] * (1 - middle->truncated));
+}
+
+/* Rows stand for depths at 550 nm: one look-up serves all bands. */
+static void fill_residual(const struct droplet_tables *tables, enum slab_side side, event_row *rows)
+{
+	for (int band = 0; band < BAND_COUNT; band++) {
+		double at[DEPTHS];
+		for (int depth = 0; depth < DEPTHS; depth++)
+			at[depth] = slab_residual_depth_index(slab_residual_depth(depth) * depth_ratio(tables, band));
 		for (int i = 0; i < WIDTH; i++) {
 			float column[SLAB_RESIDUAL_DEPTH_COUNT];
-			slab_residual_column(&slab->band[band], side, residual_angle(i), column);
-			for (int depth = 0; depth < DEPTHS; depth++)
-				rows[depth][i][band] = column[depth];
+			slab_residual_column(&tables->slab->band[band], side, residual_angle(i), column);
+			for (int depth = 0; depth < DEPTHS; depth++) {
+				const int k = (int)fmin(at[depth], SLAB_RESIDUAL_DEPTH_COUNT - 2);
+				rows[depth][i][band] = column[k] + ((float)at[depth] - (float)k) * (column[k + 1] - column[k]);
+			}
 		}
+	}
 }
 
 static bool upload_events(struct droplets *droplets)
@@ -90,8 +105,8 @@ static bool upload_events(struct droplets *droplets)
 		return false;
 	fill_peak(droplets->tables->forward, rows);
 	fill_blur(droplets->tables->forward, rows + DEPTHS);
-	fill_residual(droplets->tables->slab, SLAB_REFLECTED, rows + 2 * DEPTHS);
-	fill_residual(droplets->tables->slab, SLAB_TRANSMITTED, rows + 3 * DEPTHS);
+	fill_residual(droplets->tables, SLAB_REFLECTED, rows + 2 * DEPTHS);
+	fill_residual(droplets->tables, SLAB_TRANSMITTED, rows + 3 * DEPTHS);
 	const bool ok = texture_init(&droplets->events, WIDTH, PARTS * DEPTHS, TEXTURE_RGBA32F, 0);
 	if (ok)
 		texture_upload(&droplets->events, &rows[0][0][0]);

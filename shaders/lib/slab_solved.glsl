@@ -31,23 +31,25 @@ float solved_residual_column(vec2 half_angle)
 }
 
 // Mean of exp(-(a - 1) t) over slant depths t = 0..s, weighted with exp(-t): what reflected light keeps of what a fuller extinction takes.
-vec3 solved_mean_kept(float s, vec3 a)
+vec3 solved_mean_kept(vec3 s, vec3 a)
 {
-	if (s < 0.01)
+	if (s.y < 0.01)
 		return vec3(1.0) - 0.5 * s * (a - vec3(1.0));
-	return (vec3(1.0) - exp(-s * a)) / (a * (1.0 - exp(-s)));
+	return (vec3(1.0) - exp(-s * a)) / (a * (vec3(1.0) - exp(-s)));
 }
 
 // Phase function of the first order of scattering with all that delta-M takes out of the peak put back once: the aureole and the blur of the
-// glory. s: slant depth, scaled, of the path in and out (reflected) or the mean one (through).
+// glory. s: slant depth at 550 nm, scaled, of the path in and out (reflected) or the mean one (through); the tables' rows are made for it, with each
+// band at the depth that it has then (renderer/stages/droplets.c).
 vec3 solved_first_phase(vec2 half_angle, float s, bool through)
 {
 	vec3 ratio = vec3(extinction) / vec3(extinction_scaled); // 1 / (1 - f)
+	vec3 depth = vec3(extinction_scaled) * (s / extinction_scaled.y);
 	vec3 sharp = phase_full(half_angle) * ratio;
 	if (through)
-		sharp *= exp((vec3(1.0) - ratio) * s);
+		sharp *= exp((vec3(1.0) - ratio) * depth);
 	else
-		sharp *= mix(vec3(1.0), solved_mean_kept(s, ratio), smoothstep(0.587, 0.854, half_angle.x * half_angle.x));
+		sharp *= mix(vec3(1.0), solved_mean_kept(depth, ratio), smoothstep(0.587, 0.854, half_angle.x * half_angle.x));
 	return max(sharp + event_at(through ? 3.0 : 2.0, solved_residual_column(half_angle), s / (s + 4.0) * (EVENT_DEPTHS - 1.0)), vec3(0.0));
 }
 

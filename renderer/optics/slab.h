@@ -39,7 +39,7 @@ struct slab_band {
 	double truncated; /* f, 0..1 */
 
 	/* Orders >= 2 of mode m, per pair of nodes i >= j at i (i+1)/2 + j: I = mu_l F0/pi (1 - exp(-tau'/mu_l)) (1 - exp(-tau'/mu_v)) K,
-	 * K = sum_m K_m cos(m azimuth) (sin_l sin_v for odd m). */
+	 * K = sum_m K_m cos(m azimuth), times sin_l sin_v for odd m, its square for even m > 0: at the zenith there is no azimuth. */
 	float order2[SLAB_SIDE_COUNT][SLAB_DEPTH_COUNT][SLAB_MODE_COUNT][SLAB_PAIR_COUNT];
 
 	/* Plane albedo, and transmittance less exp(-tau'/mu), over 1 - exp(-tau'/mu), at the nodes. */

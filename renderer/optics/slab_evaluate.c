@@ -116,7 +116,7 @@ void slab_multiple_series(const struct slab_solution *solution, int band, enum s
 			double through = side == SLAB_TRANSMITTED ? k : mode_at(table, SLAB_TRANSMITTED, &depth, mode, factor);
 			k += side == SLAB_TRANSMITTED ? (share - 1) * through : (1 - share) * through;
 		}
-		series->mode[mode] = k * scale * (mode % 2 ? sines : 1);
+		series->mode[mode] = k * scale * (mode == 0 ? 1 : mode % 2 ? sines : sines * sines);
 	}
 }
 

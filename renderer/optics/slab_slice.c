@@ -12,7 +12,7 @@ enum { N = SLAB_NODE_COUNT, VIEWS = SLAB_SLICE_VIEW_COUNT, AZIMUTHS = SLAB_SLICE
 /* Factors that all depths share. */
 struct directions {
 	float sun[N];
-	float view[2][N][VIEWS]; /* of even modes, and of odd ones: times both sines */
+	float view[3][N][VIEWS]; /* of mode 0, of odd modes: times both sines, of even ones: times their squares */
 	float cosine[MODES][AZIMUTHS];
 };
 
@@ -49,6 +49,7 @@ static void fill_directions(const struct slab_solution *solution, double mu_l, s
 		for (int i = 0; i < N; i++) {
 			directions->view[0][i][view] = (float)factor[i];
 			directions->view[1][i][view] = (float)(sines * factor[i]);
+			directions->view[2][i][view] = (float)(sines * sines * factor[i]);
 		}
 	}
 	for (int mode = 0; mode < MODES; mode++)
@@ -96,7 +97,7 @@ INLINE void fill_depth_any(const float order2[MODES][SLAB_PAIR_COUNT], const str
 			continue;
 		for (int i = 0; i < N; i++)
 			for (int view = 0; view < VIEWS; view++)
-				value[view] += directions->view[mode % 2][i][view] * lit[i];
+				value[view] += directions->view[mode == 0 ? 0 : 2 - mode % 2][i][view] * lit[i];
 		for (int view = 0; view < VIEWS; view++)
 			for (int i = 0; i < AZIMUTHS; i++)
 				k[view][i] += value[view] * directions->cosine[mode][i];

@@ -67,8 +67,8 @@ static double store_mode(const struct job *job, int band, int mode, int index, c
 		for (int j = 0; j <= i; j++, pair++) {
 			double a = depth / mu[i], b = depth / mu[j];
 			double scale = 2 * sqrt(mu[i] * mu[j]) * (1 - layer->direct[i]) * (1 - layer->direct[j]);
-			if (mode % 2)
-				scale *= sqrt((1 - mu[i] * mu[i]) * (1 - mu[j] * mu[j]));
+			double square = (1 - mu[i] * mu[i]) * (1 - mu[j] * mu[j]);
+			scale *= mode == 0 ? 1 : mode % 2 ? sqrt(square) : square;
 			double factor = (mode > 0 ? 2 : 1) / scale;
 			double r = (layer->r_through[i][j] + layer->r_through[j][i]) / 2;
 			double t = (layer->t_through[i][j] + layer->t_through[j][i]) / 2;

@@ -213,6 +213,21 @@ static void radiance_adds_up(void **state)
 		}
 }
 
+/* Seen at the zenith there is no azimuth, under light that grazes either. */
+static void zenith_has_no_azimuth(void **state)
+{
+	struct fixture *fixture = *state;
+	for (int i = 0; i < 200; i++) {
+		double tau = random_depth(), mu_l = 0.01 + 0.99 * random_unit();
+		enum slab_side side = i % 2 ? SLAB_REFLECTED : SLAB_TRANSMITTED;
+		double here = slab_radiance_multiple(fixture->solution, i % BAND_COUNT, side, tau, mu_l, 1, 0);
+		for (int k = 1; k <= 6; k++) {
+			double there = slab_radiance_multiple(fixture->solution, i % BAND_COUNT, side, tau, mu_l, 1, k * M_PI / 6);
+			assert_near(there / here, 1, 1e-9, "another azimuth");
+		}
+	}
+}
+
 /* --- limits -------------------------------------------------------------------------------------------------------------------- */
 
 static void thin_layers_scatter_once(void **state)
@@ -449,6 +464,7 @@ int main(void)
 		cmocka_unit_test(conservation),
 		cmocka_unit_test(reciprocity),
 		cmocka_unit_test(radiance_adds_up),
+		cmocka_unit_test(zenith_has_no_azimuth),
 		cmocka_unit_test(thin_layers_scatter_once),
 		cmocka_unit_test(thick_layers),
 		cmocka_unit_test(extremes),

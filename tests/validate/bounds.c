@@ -84,6 +84,10 @@ bool bounds_hold(const struct measurements *measurements)
 static void print_value(FILE *file, const struct bound *bound, double value)
 {
 	const bool percent = bound->unit[0] == '%';
+	if (isnan(value)) {
+		fprintf(file, " no number |");
+		return;
+	}
 	fprintf(file, " %.3g%s%s |", percent ? 100 * value : value, bound->unit[0] ? " " : "", bound->unit);
 }
 

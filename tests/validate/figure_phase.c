@@ -47,14 +47,13 @@ static void describe(FILE *page, const struct optics *optics, double ripple)
 {
 	fprintf(page,
 		"\n## Figure 4: phase function\n\n![Phase function of the paper's droplets](figure4.svg)\n\n"
-		"N0 300 cm^-3, gamma 2, re 7 um, all sizes together (colours), and one droplet of 20 um alone at 550 nm (grey), which has "
-		"a "
+		"N0 300 cm^-3, gamma 2, re 7 um, all sizes together (colours), and one droplet of 20 um alone at 550 nm (grey). One "
+		"droplet's P has a "
 		"ripple for\n"
-		"every size parameter: between 60 and 120 degrees its P goes up and down between values a factor %.0f apart, a "
-		"distribution's is smooth. "
-		"The "
-		"inset is the\n"
-		"same in polar form, log P from 0.01 (centre) to 1000.\n\n"
+		"every size parameter, between 60 and 120 degrees over a factor %.0f; all together have none. Inset: the same in polar "
+		"form, log P "
+		"from 0.01\n"
+		"(centre) on.\n\n"
 		"| band | kappa in 1/m | asymmetry | P_f | P(0) | fogbow at | P there | glory's ring at | P(180) over P(175) |\n"
 		"| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
 		ripple);

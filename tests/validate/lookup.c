@@ -125,6 +125,12 @@ void validate_lookup(struct validation *validation)
 		compare_frame(validation, &context, i);
 	for (int i = 0, count = effort_count(validation, 40); i < count; i++)
 		compare_cone(validation, &context, i);
+	fprintf(validation->page,
+		"- Look-ups: random tau 0.01 to 1000, sun and view down to a degree above the horizon, all azimuths, outside 3 degrees of "
+		"the "
+		"forward and 5 of the\n"
+		"  backward direction, run by %s.\n",
+		glGetString(GL_RENDERER));
 	cache_destroy(context.cache);
 	glDeleteBuffers(1, &context.block_buffer);
 	gl_context_destroy(gl);

@@ -6,7 +6,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-enum { ANGLES = 25, PEAK_ANGLES = 48, THREADS = 2 };
+enum { ANGLES = 25, PEAK_ANGLES = 64, THREADS = 2 };
 
 static const double degrees[ANGLES] = {0,  0.5, 1,   2,   3,   5,   7,   10,  15,  20,  30,  45, 60,
 				       75, 90,  105, 120, 135, 140, 142, 145, 160, 175, 178, 180};
@@ -22,15 +22,15 @@ struct task {
 	struct sums sums;
 };
 
-/* Chance to be scattered by less than 5 degrees: Simpson's rule in the square root of the angle. */
+/* Chance to be scattered by less than 5 degrees: Simpson's rule over the square root of the angle. */
 static double peak_of(double x, double efficiency, const struct mie_term *terms, int count)
 {
 	double sum = 0;
 	for (int i = 1; i <= PEAK_ANGLES; i++) {
-		const double t = (double)i / PEAK_ANGLES, angle = FORWARD_PEAK_ANGLE * t, weight = i == PEAK_ANGLES ? 1 : i % 2 ? 4 : 2;
+		const double t = (double)i / PEAK_ANGLES, angle = FORWARD_PEAK_ANGLE * t * t, weight = i == PEAK_ANGLES ? 1 : i % 2 ? 4 : 2;
 		double complex amplitude[2];
 		mie_amplitudes(terms, count, cos(angle), amplitude);
-		sum += weight * sin(angle) * mie_phase(x, efficiency, amplitude);
+		sum += weight * 2 * t * sin(angle) * mie_phase(x, efficiency, amplitude);
 	}
 	return sum * FORWARD_PEAK_ANGLE / PEAK_ANGLES / 3 / 2;
 }
@@ -56,7 +56,7 @@ static void add_sphere(struct sums *sums, double x, double m, double number)
 	free(scratch);
 }
 
-/* Steps of 0.05 and a thousandth of the size parameter, over all spheres whose share of the cross-section is above a millionth of the
+/* Steps of 0.03 and a 6000th of the size parameter, over all spheres whose share of the cross-section is above a millionth of the
  * largest.
  */
 static void *sum_spheres(void *argument)
@@ -68,7 +68,7 @@ static void *sum_spheres(void *argument)
 	const double per_x = wavelength_m / (2 * M_PI), constant = 1e6 * task->dsd.n0_per_cm3 / (tgamma(gamma) * rn);
 	double x = 0.1, step;
 	for (int i = 0; x * per_x < (mode + 30 + 6 * sqrt(mode)) * rn; i++, x += step) {
-		step = fmax(0.05, x / 1000);
+		step = fmax(0.03, x / 6000);
 		const double r = x * per_x, u = r / rn;
 		if (i % THREADS != task->first || pow(u, mode) * exp(-u) < 1e-6 * largest)
 			continue;

@@ -100,6 +100,23 @@ static void remove_folder(const char *folder)
 	rmdir(folder);
 }
 
+/* What they were measured on. */
+static void describe(FILE *page)
+{
+	char line[256], model[200] = "unknown";
+	FILE *file = fopen("/proc/cpuinfo", "r");
+	while (file && fgets(line, sizeof line, file))
+		if (sscanf(line, "model name : %199[^\n]", model) == 1)
+			break;
+	if (file)
+		fclose(file);
+	fprintf(page,
+		"- Times: processor %s, %ld of them. They fail the run only beyond twice the bound, since a busy machine is no error of "
+		"the "
+		"code.\n",
+		model, sysconf(_SC_NPROCESSORS_ONLN));
+}
+
 void validate_times(struct validation *validation)
 {
 	char folder[] = "/tmp/stratus-validate-XXXXXX";
@@ -110,6 +127,7 @@ void validate_times(struct validation *validation)
 	for (int i = 0; i < count; i++)
 		measure_distribution(&params, &times, i);
 	remove_folder(folder);
+	describe(validation->page);
 	judge(validation, &times, DROPLETS_COMPUTED, TALLY_COLD, count);
 	judge(validation, &times, DROPLETS_FROM_DISK, TALLY_DISK, count);
 	judge(validation, &times, DROPLETS_FROM_MEMORY, TALLY_MEMORY, count);

@@ -19,6 +19,7 @@
 struct validation {
 	struct kernel *kernel;
 	double effort;      /* 1: the full run; less: as many photons, distributions and probes fewer, which the bounds were not made for */
+	const char *only;   /* the one part to run, NULL: all; what is not measured counts as broken */
 	const char *folder; /* for the figures' data */
 	struct measurements measured;
 	FILE *page; /* the figures' text, as the parts have it to say */

@@ -88,7 +88,8 @@ static void describe_head(FILE *page)
 	fprintf(page,
 		"\n## Figure 8: fluxes by orders over the thickness\n\n![Fluxes by orders](figure8.svg)\n\n"
 		"Modified phase function, sun 30 degrees from the vertical, 550 nm, fractions of the incident flux. Dots: photons. Lines: "
-		"solver. Dashes:\nthe paper's form (appendix A) fitted to these droplets. The table has photons / solver / form.\n\n| H in "
+		"solver. Pale bands:\nthe paper's form (appendix A) fitted to these droplets. The table has photons / solver / form.\n\n| "
+		"H in "
 		"m |");
 	for (int k = 0; k < QUANTITIES; k++)
 		fprintf(page, " %s |", names[k]);
@@ -121,9 +122,11 @@ void figure_fluxes(struct validation *validation)
 	}
 	fclose(file);
 	fprintf(validation->page,
-		"\nThe largest standard error is %.4f. The solver is within %.4f of the photons; the form within %.4f, by eye as perfect "
-		"as the "
-		"paper calls it.\n[paper-fit.md](paper-fit.md) has all incidences, and where the form ends.\n",
+		"\nThe largest standard error is %.4f. The solver is within %.4f of the photons. The form is within %.4f, near perfect as "
+		"the paper "
+		"says, but in\n"
+		"thin layers most of what it has of R2 and R3+ is error, which the logarithmic scale shows.\n"
+		"[paper-fit.md](paper-fit.md) has all incidences, and where the form ends.\n",
 		error, worst, paper);
 	solved_finish(&solved);
 }

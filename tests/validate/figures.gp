@@ -50,9 +50,10 @@ set format y "%g"
 eval start("figure6", 760)
 set key at graph 1.02,0.95 left top vertical Left reverse samplen 2 width 0 noinvert
 set lmargin 10; set rmargin 20
-set nonlinear y via sqrt(y) inverse y*y
 set xrange [-88:88]; set xtics -90,30,90
-set yrange [0:0.75]; set ytics (0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+set yrange [0:0.75]
+set nonlinear y via sqrt(y) inverse y*y
+set ytics (0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
 set style fill solid 0.9 noborder
 set ylabel "radiance for F_0 = 1, in 1/sr (square root scale)"
 array shade[6] = [blue, sky, green, yellow, orange, red]
@@ -80,7 +81,7 @@ set xrange [1:1000]; set xtics (1, 3, 10, 30, 100, 300, 1000)
 set key outside top center horizontal Left reverse samplen 2 width 0
 set xlabel "thickness H in m"
 array tint[4] = [pink, blue, sky, green]
-array order[4] = ["0", "1", "2", "3+"]
+array order[4] = ["order 0", "1", "2", "3+"]
 form = "lw 7 lc rgb '#66cccccc'"
 set multiplot layout 1,2
 set ylabel "fraction of the incident flux"

@@ -1,7 +1,7 @@
 /* Figure 9: radiance in the principal plane of two slabs, of photons, of the solver and of the paper's form by orders. */
 #include "tests/validate/validate.h"
 
-#include "tests/validate/paper_radiance.h"
+#include "renderer/optics/paper_radiance.h"
 
 enum { BAND = 1, VIEWS = 41, AZIMUTHS = 2, FINE = 4 };
 
@@ -33,7 +33,7 @@ static double solved_at(const struct solved *solved, const struct slab *slab, en
 
 static double paper_at(const struct paper_layer *layer, enum slab_side side, double degrees)
 {
-	const struct paper_light light = paper_layer_light(layer, side, cos(degrees * DEGREE), degrees < 0 ? M_PI : 0);
+	const struct paper_radiance light = paper_radiance_at(layer, side, cos(degrees * DEGREE), degrees < 0 ? M_PI : 0);
 	return light.order[0] + light.order[1] + light.order[2] + light.order[3];
 }
 
@@ -47,7 +47,7 @@ static void write_curves(const struct validation *validation, int number, const 
 		const double degrees = (double)i / FINE;
 		fprintf(file, "%g", degrees);
 		for (int side = 0; side < SLAB_SIDE_COUNT; side++) {
-			const struct paper_light light = paper_layer_light(layer, side, cos(degrees * DEGREE), i < 0 ? M_PI : 0);
+			const struct paper_radiance light = paper_radiance_at(layer, side, cos(degrees * DEGREE), i < 0 ? M_PI : 0);
 			double sum = 0;
 			for (int order = 3; order >= 0; order--)
 				fprintf(file, "\t%.5g", sum += light.order[order]);
@@ -144,8 +144,9 @@ void figure_radiance(struct validation *validation)
 	for (int number = 0; number < 2; number++) {
 		struct errors errors[SLAB_SIDE_COUNT][2] = {0};
 		const struct slab *slab = &slabs[number];
-		const struct paper_layer layer =
-			paper_layer_init(solved.optics, &forward, &fit, slab->thickness_m, cos(slab->zenith_deg * DEGREE));
+		struct paper_layer layer;
+		paper_layer_init(&layer, &fit, solved.optics, &forward, BAND, slab->thickness_m * solved.optics->extinction_per_m[BAND],
+				 cos(slab->zenith_deg * DEGREE));
 		write_curves(validation, number, &solved, &layer);
 		write_dots(validation, number, &solved, &layer, errors);
 		print_errors(validation->page, slab, errors);

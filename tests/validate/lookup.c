@@ -68,6 +68,7 @@ static void compare_frame(struct validation *validation, struct stage_context *c
 	for (int base = 0; base < 2; base++)
 		if (frame.lit[base])
 			compare_side(validation, &frame, &scene, base);
+	droplets_release(context);
 }
 
 /* --- the aureole ----------------------------------------------------------------------------------------------------------------- */
@@ -112,13 +113,16 @@ static void compare_cone(struct validation *validation, struct stage_context *co
 			  "gamma %.3g, re %.3g um, tau %.3g, sun at %.1f deg", scene.dsd.gamma, scene.dsd.effective_radius_um, tau,
 			  90 - scene.sun.elevation_deg);
 	}
+	droplets_release(context);
 }
 
 void validate_lookup(struct validation *validation)
 {
 	struct gl_context *gl = gl_context_create(-1, false);
 	require(gl, "no OpenGL context");
-	struct stage_context context = {.kernel = validation->kernel, .cache = cache_create(64u << 20)};
+	struct stage_context context = {.cache = cache_create(64u << 20)};
+	context.droplets = droplet_store_create(&(struct droplet_store_params){.kernel = validation->kernel, .memory_bytes = 1});
+	require(context.cache && context.droplets, "out of memory");
 	glCreateBuffers(1, &context.block_buffer);
 	glNamedBufferStorage(context.block_buffer, sizeof context.block, NULL, GL_DYNAMIC_STORAGE_BIT);
 	for (int i = 0, count = effort_count(validation, 60); i < count; i++)
@@ -134,4 +138,5 @@ void validate_lookup(struct validation *validation)
 	cache_destroy(context.cache);
 	glDeleteBuffers(1, &context.block_buffer);
 	gl_context_destroy(gl);
+	droplet_store_destroy(context.droplets);
 }

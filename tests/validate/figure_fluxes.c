@@ -77,7 +77,7 @@ static void write_curves(const struct validation *validation, const struct optic
 
 static void print_row(FILE *page, double thickness, const struct sample *sample)
 {
-	fprintf(page, "| %.3g |", thickness);
+	fprintf(page, "| %.4g |", thickness);
 	for (int k = 0; k < QUANTITIES; k++)
 		fprintf(page, " %.4f / %.4f / %.4f |", sample->photons[k], sample->solved[k], sample->paper[k]);
 	fprintf(page, "\n");

@@ -119,7 +119,8 @@ static void describe(FILE *page, const struct orders *of, const double *solved, 
 		"function keeps sharp; the solver, of the full one, is within %.1f %% of its photons. Orders 1 and 2 of the modified "
 		"function "
 		"(dashed) hold as\n"
-		"much as %.1f orders of the full one in the mean, between %.1f and %.1f; the paper says up to five.\n",
+		"much as %.1f orders of the full one in the mean, at least %.1f and, in the glory, up to %.1f or more; the paper says up "
+		"to five.\n",
 		100 * off_modified, 100 * off_solved, mean, least, most);
 }
 

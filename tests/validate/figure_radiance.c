@@ -137,7 +137,8 @@ void figure_radiance(struct validation *validation)
 		"In the sun's vertical plane, 550 nm, full phase function; views on the right look towards the sun's side. Areas: the "
 		"paper's "
 		"form by orders,\n"
-		"fitted to these droplets, on top of each other. Black line: solver. Dots: photons, with bars of two standard errors. "
+		"fitted to these droplets, on top of each other, order 0 being the forward peak. Black line: solver. Dots: photons, with "
+		"bars of two standard errors. "
 		"Transmitted light is on\n"
 		"a logarithmic scale, for the aureole. Differences from the photons, outside 3 degrees of forward:\n\n"
 		"| slab, sun, side | solver, rms | worst | paper's form, rms | worst |\n| --- | --- | --- | --- | --- |\n");

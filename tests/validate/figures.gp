@@ -21,11 +21,11 @@ set xlabel "scattering angle in degrees"
 set ylabel "phase function P (isotropic: 1)"
 set xrange [0:180]; set xtics 30
 set yrange [0.003:20000]; set format y "10^{%L}"
-plot file("figure4") using 1:2 with lines lc rgb red lw 1.8 title "650 nm", \
-	"" using 1:3 with lines lc rgb green lw 1.8 title "550 nm", \
-	"" using 1:4 with lines lc rgb blue lw 1.8 title "450 nm", \
-	"" using 1:5 with lines lc rgb grey lw 0.7 title "one of 20 µm", \
-	for [k = 2:4] "" using 1:k with lines lc rgb (k == 2 ? red : k == 3 ? green : blue) lw 1.8 notitle
+plot NaN with lines lc rgb red lw 1.8 title "650 nm", \
+	NaN with lines lc rgb green lw 1.8 title "550 nm", \
+	NaN with lines lc rgb blue lw 1.8 title "450 nm", \
+	file("figure4") using 1:5 with lines lc rgb grey lw 0.7 title "one of 20 µm", \
+	for [k = 2:4] "" every 2 using 1:k with lines lc rgb (k == 2 ? red : k == 3 ? green : blue) lw 1.8 notitle
 # The inset: log P from 0.01 as radius, forward to the right, both halves.
 unset logscale; unset key; unset border; unset tics; unset xlabel; unset ylabel; unset grid
 set size 0.5,0.52; set origin 0.44,0.37
@@ -37,8 +37,8 @@ y(angle, p) = rho(p) * sin(angle * pi / 180)
 set object 1 circle at 0,0 size 2 fs empty border lc rgb "#bbbbbb"
 set label 1 "P = 1" at -1.9,1.6 textcolor rgb "#777777" font ",10"
 set label 2 "forward" at 4.0,0.6 textcolor rgb "#777777" font ",10"
-plot for [side = -1:1:2] file("figure4") using (x($1, $5)):(side * y($1, $5)) with lines lc rgb grey lw 0.4, \
-	for [k = 2:4] for [side = -1:1:2] "" using (x($1, column(k))):(side * y($1, column(k))) with lines \
+plot for [side = -1:1:2] file("figure4") every 2 using (x($1, $5)):(side * y($1, $5)) with lines lc rgb grey lw 0.4, \
+	for [k = 2:4] for [side = -1:1:2] "" every 4 using (x($1, column(k))):(side * y($1, column(k))) with lines \
 		lc rgb (k == 2 ? red : k == 3 ? green : blue)
 unset multiplot
 unset object 1; unset label 1; unset label 2
@@ -78,10 +78,10 @@ eval start("figure8", 440)
 unset nonlinear y
 set logscale x
 set xrange [1:1000]; set xtics (1, 3, 10, 30, 100, 300, 1000)
-set key outside top center horizontal Left reverse samplen 2 width 0
+set key outside top center horizontal Left reverse samplen 1.5 width -2
 set xlabel "thickness H in m"
 array tint[4] = [pink, blue, sky, green]
-array order[4] = ["order 0", "1", "2", "3+"]
+array order[4] = ["i = 0", "1", "2", "3+"]
 form = "lw 7 lc rgb '#66cccccc'"
 set multiplot layout 1,2
 set ylabel "fraction of the incident flux"
@@ -105,10 +105,10 @@ unset logscale
 # --- figure 9: radiance of two slabs ---------------------------------------------------------------------------------------------------
 eval start("figure9", 800)
 set xrange [-88:88]; set xtics -60,30,60
-set key outside top center horizontal Left reverse samplen 1.5 width 0
+set key outside top center horizontal Left reverse samplen 1.5 width -2
 set style fill solid 0.8 noborder
 array area[4] = [green, sky, blue, pink]
-array part[4] = ["3+", "2", "1", "0: peak"]
+array part[4] = ["3+", "2", "1", "0"]
 array case[2] = ["H = 100 m, sun at 70°", "H = 5 m, sun at 80°"]
 set multiplot layout 2,2
 do for [side = 0:1] { do for [number = 0:1] {
@@ -127,9 +127,9 @@ do for [side = 0:1] { do for [number = 0:1] {
 	form_key = side == 0 && number == 0
 	other_key = side == 0 && number == 1
 	bottom = side ? 1e-6 : 0
-	plot for [k = 4:1:-1] file(sprintf("figure9curves%d", number)) using 1:(column(1 + 5*side + k)) with filledcurves y1=bottom lc rgb area[k] \
+	plot for [k = 4:1:-1] file(sprintf("figure9curves%d", number)) every 2 using 1:(column(1 + 5*side + k)) with filledcurves y1=bottom lc rgb area[k] \
 			title (form_key ? part[k] : ""), \
-		"" using 1:(column(6 + 5*side)) with lines lw 1.5 lc rgb "black" title (other_key ? "solver" : ""), \
+		"" every 2 using 1:(column(6 + 5*side)) with lines lw 1.5 lc rgb "black" title (other_key ? "solver" : ""), \
 		file(sprintf("figure9dots%d", number)) using 1:(column(2 + 2*side) - 2*column(3 + 2*side)):(0):(4*column(3 + 2*side)) with vectors nohead lc rgb red notitle, \
 		"" using 1:(column(2 + 2*side)) with points pt 7 ps 0.45 lc rgb red title (other_key ? "photons" : "")
 } }

@@ -121,8 +121,9 @@ struct slab_orders {
 
 enum slab_phase { SLAB_PHASE_FULL, SLAB_PHASE_MODIFIED };
 
-/* By successive orders, for one layer: 0.4 ms. tau is that of the full phase function, > 0, also where the modified one is asked for, whose
- * own is (1 - P_f) tau. mu_l at least 1e-3 (clamped). */
+/* By successive orders, for one layer: 0.5 ms. The first is exact; the others of the modified phase function, whose edge at 5 degrees 32
+ * streams blur, are good to 2e-4 (a few percent of what thin layers of small droplets send back). tau is that of the full phase function, >
+ * 0, also where the modified one is asked for, whose own is (1 - P_f) tau. mu_l at least 1e-3 (clamped). */
 struct slab_orders slab_orders_at(const struct optics *optics, int band, enum slab_phase phase, double tau, double mu_l);
 
 /* --- a renderer's table -------------------------------------------------------------------------------------------------------- */

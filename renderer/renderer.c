@@ -176,6 +176,10 @@ struct job {
 static bool run_optics(struct job *job)
 {
 	struct stage_context *context = &job->renderer->context;
+	if (!scene_has_clouds(job->scene)) {
+		context->reused = false; /* it does not run at all */
+		return true;
+	}
 	job->droplets = droplets_get(context, job->scene);
 	job->slab_rows = job->droplets ? slab_rows_get(context, job->scene, job->droplets) : NULL;
 	return job->slab_rows && slab_slices_get(context, job->scene, job->droplets, &job->slab_slices);
@@ -185,13 +189,16 @@ static bool run_optics(struct job *job)
  * between them. A deck counts with 0.6 of its largest thickness, about the mean of its field. */
 static void mean_albedo(const struct job *job, double albedo[3])
 {
+	for (int band = 0; band < 3; band++)
+		albedo[band] = job->ground.mean[band];
+	if (!job->droplets)
+		return;
 	const struct scene_clouds *clouds = &job->scene->clouds;
-	const double cover = clouds->type == CLOUD_NONE ? 0 : clouds->coverage;
 	const struct droplet_tables *droplets = job->droplets->tables;
 	for (int band = 0; band < 3; band++) {
 		const double tau = 0.6 * clouds->thickness_m * droplets->optics->extinction_per_m[band];
 		const double r = slab_spherical_albedo(droplets->slab, band, tau), t = 1 - r, ground = job->ground.mean[band];
-		albedo[band] = (1 - cover) * ground + cover * (r + t * t * ground / (1 - r * ground));
+		albedo[band] += clouds->coverage * (r + t * t * ground / (1 - r * ground) - ground);
 	}
 }
 

@@ -72,6 +72,11 @@ struct scene scene_default(void)
 	return scene;
 }
 
+bool scene_has_clouds(const struct scene *scene)
+{
+	return scene->clouds.type != CLOUD_NONE && scene->clouds.thickness_m > 0;
+}
+
 double scene_dsd_liquid_water(const struct scene_dsd *dsd)
 {
 	const double rn_m = dsd->effective_radius_um / (dsd->gamma + 2) * 1e-6;

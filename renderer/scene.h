@@ -146,6 +146,9 @@ struct scene {
 /* The scene that an empty request means. Padding is zeroed. Any thread. */
 struct scene scene_default(void);
 
+/* Is there a layer, of droplets that matter? */
+bool scene_has_clouds(const struct scene *scene);
+
 /* Liquid water content of a droplet size distribution in g/m3: 4/3 pi rho N0 <r^3>, rho = 1e6 g/m3. Any thread. */
 double scene_dsd_liquid_water(const struct scene_dsd *dsd);
 

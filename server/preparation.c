@@ -51,6 +51,8 @@ static bool find(struct preparation *preparation, struct render_job *job)
 
 bool preparation_push(struct preparation *preparation, struct render_job *job)
 {
+	if (!scene_has_clouds(job->scene))
+		return render_queue_push(preparation->queue, job);
 	if (!find(preparation, job))
 		return render_queue_push(preparation->waiting, job);
 	if (render_queue_push(preparation->queue, job))

@@ -28,6 +28,7 @@ static const struct kind kinds[PROBLEM_KIND_COUNT] = {
 	[PROBLEM_RENDER_FAILED] = {500, "render-failed", "The image could not be made"},
 	[PROBLEM_QUEUE_FULL] = {503, "queue-full", "Too much to do"},
 	[PROBLEM_TRACINGS_FULL] = {503, "queue-full", "Too much to do"},
+	[PROBLEM_COMPUTERS_FULL] = {503, "queue-full", "Too much to do"},
 	[PROBLEM_NO_MEMORY] = {503, "no-memory", "No memory for this image"},
 	[PROBLEM_STARTING] = {503, "starting", "Not ready yet"},
 	[PROBLEM_SHUTTING_DOWN] = {503, "shutting-down", "Shutting down"},

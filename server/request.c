@@ -87,6 +87,8 @@ double request_read_deadline(struct request *request)
 	char *end;
 	errno = 0;
 	long milliseconds = strtol(text, &end, 10);
+	while (*end == ' ' || *end == '\t')
+		end++; /* blanks round a header's value are none of it (RFC 9110, 5.5) */
 	if (errno != 0 || end == text || *end != '\0' || milliseconds < 1 || milliseconds > REQUEST_TIMEOUT_MS_MAX)
 		problem_set(&request->problem, PROBLEM_BAD_REQUEST, "X-Timeout-Ms must be a whole number from 1 to %d.",
 			    REQUEST_TIMEOUT_MS_MAX);

@@ -68,6 +68,8 @@ static unsigned retry_after(const struct request *request)
 		return service_retry_seconds(request->service);
 	case PROBLEM_TRACINGS_FULL:
 		return service_tracing_retry_seconds(request->service);
+	case PROBLEM_COMPUTERS_FULL:
+		return service_computing_retry_seconds(request->service);
 	case PROBLEM_STARTING:
 		return 2;
 	case PROBLEM_SHUTTING_DOWN:

@@ -4,7 +4,9 @@
  */
 #include "server/routes.h"
 
+#include "renderer/log.h"
 #include "server/clock.h"
+#include "server/entity_tag.h"
 #include "server/number_text.h"
 #include "server/query.h"
 #include "server/response.h"
@@ -17,21 +19,24 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum optics_outcome { OPTICS_OK, OPTICS_EXPIRED, OPTICS_ABANDONED, OPTICS_FAILED };
+
 struct optics_work {
 	struct work work;
 	struct request *request;
 	struct scene_input input;
 	double sun_zenith_deg;
 	bool zenith_given, refused;
-	double deadline_ms;
-	bool late;
-	json_t *answer;
+	char tag[ENTITY_TAG_SIZE];
+	double deadline_ms, queued_ms;
+	enum optics_outcome outcome;
+	char *answer;
 };
 
 static void work_destroy(void *context)
 {
 	struct optics_work *work = context;
-	json_decref(work->answer);
+	free(work->answer);
 	free(work);
 }
 
@@ -93,6 +98,8 @@ static void read_parameters(struct request *request, struct optics_work *work)
 		problem_add(problem, "/sun", "is below the horizon, where the fit has no row");
 }
 
+/* --- JSON ------------------------------------------------------------------------------------------------------------------------ */
+
 static json_t *numbers_to_json(const double *numbers, int count)
 {
 	json_t *array = json_array();
@@ -128,26 +135,81 @@ static json_t *optics_to_json(const struct optics *optics, const struct paper_fi
 			 fit_to_json(table, sun_zenith_deg));
 }
 
-static void compute(struct work *base)
+/* --- computing, on a worker ------------------------------------------------------------------------------------------------------ */
+
+static enum optics_outcome reason_to_stop(const struct optics_work *work)
 {
-	struct optics_work *work = (struct optics_work *)((char *)base - offsetof(struct optics_work, work));
+	if (clock_now_ms() >= work->deadline_ms)
+		return OPTICS_EXPIRED;
+	return work->request->service->giving_up || request_is_abandoned(work->request) ? OPTICS_ABANDONED : OPTICS_OK;
+}
+
+static char *text_of(json_t *root)
+{
+	char *text = root ? json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9)) : NULL;
+	json_decref(root);
+	return text;
+}
+
+static void compute(struct optics_work *work)
+{
 	const struct scene *scene = &work->input.scene;
-	struct droplet_store *store = render_thread_droplets(work->request->service->render_thread);
+	struct service *service = work->request->service;
+	struct droplet_store *store = render_thread_droplets(service->render_thread);
 	struct timings *timings = &work->request->timings;
 	struct paper_fit_table fit;
 	enum droplet_source source, fit_source;
-	double start = clock_now_ms();
+	const double start = clock_now_ms();
 	const struct droplet_tables *tables = droplet_store_get(store, &scene->dsd, scene->model.optics, &source);
-	bool good = tables && droplet_store_get_fit(store, &scene->dsd, scene->model.optics, &fit, &fit_source);
-	double ready = clock_now_ms();
-	timings_set(timings, TIMING_OPTICS, ready - start);
+	work->outcome = tables ? reason_to_stop(work) : OPTICS_FAILED;
+	bool good = work->outcome == OPTICS_OK && droplet_store_get_fit(store, &scene->dsd, scene->model.optics, &fit, &fit_source);
+	timings_set(timings, TIMING_OPTICS, clock_now_ms() - start);
 	timings->entry[TIMING_OPTICS].reused = good && source == DROPLETS_FROM_MEMORY && fit_source == DROPLETS_FROM_MEMORY;
-	work->late = ready >= work->deadline_ms;
-	if (good && !work->late)
-		work->answer = optics_to_json(tables->optics, &fit, work->sun_zenith_deg);
+	if (good)
+		work->answer = text_of(optics_to_json(tables->optics, &fit, work->sun_zenith_deg));
+	if (work->outcome == OPTICS_OK)
+		work->outcome = work->answer ? reason_to_stop(work) : OPTICS_FAILED;
 	if (tables)
 		droplet_store_release(store, tables);
+	service->computing_ms = clock_now_ms() - start;
+}
+
+static void run(struct work *base)
+{
+	struct optics_work *work = (struct optics_work *)((char *)base - offsetof(struct optics_work, work));
+	timings_set(&work->request->timings, TIMING_QUEUE, clock_now_ms() - work->queued_ms);
+	work->outcome = reason_to_stop(work);
+	if (work->outcome == OPTICS_OK)
+		compute(work);
+	if (work->outcome == OPTICS_FAILED)
+		log_error("request %s: the optics could not be computed", work->request->id);
 	request_resume(work->request);
+}
+
+/* --- answering, on the HTTP thread ------------------------------------------------------------------------------------------ */
+
+/* The numbers follow from the droplets, the angle, and the program that computes them. */
+static bool set_tag(struct optics_work *work, const struct service *service)
+{
+	struct text tagged = {0};
+	const struct scene *scene = &work->input.scene;
+	text_printf(&tagged, "optics|%a|%a|%a|%d|%a|%s", scene->dsd.n0_per_cm3, scene->dsd.gamma, scene->dsd.effective_radius_um,
+		    (int)scene->model.optics, work->sun_zenith_deg, service->pixel_version);
+	const bool good = !tagged.failed;
+	if (good)
+		entity_tag_of(tagged.data, tagged.length, work->tag);
+	text_finish(&tagged);
+	return good;
+}
+
+static enum MHD_Result send_optics(struct request *request, unsigned status, struct MHD_Response *response)
+{
+	const struct optics_work *work = request->work;
+	if (status == MHD_HTTP_OK)
+		response_set(response, "Content-Type", "application/json");
+	response_set(response, "ETag", work->tag);
+	response_set(response, "Cache-Control", CACHE_KEEP);
+	return response_send(request, status, response);
 }
 
 static enum MHD_Result finish(struct request *request)
@@ -155,16 +217,23 @@ static enum MHD_Result finish(struct request *request)
 	struct optics_work *work = request->work;
 	if (work->refused) {
 		metrics_count_rejection(request->service->metrics, REJECTED_FULL);
-		return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "The workers are busy.");
+		return response_send_new_problem(request, PROBLEM_COMPUTERS_FULL, "%d such calls are waiting, and no more may.",
+						 request->service->config->queue_length);
 	}
-	if (work->late)
+	switch (work->outcome) {
+	case OPTICS_EXPIRED:
 		return response_send_new_problem(request, PROBLEM_DEADLINE, "The optics were not ready within their deadline.");
-	if (!work->answer)
+	case OPTICS_ABANDONED:
+		return MHD_NO;
+	case OPTICS_FAILED:
 		return response_send_new_problem(request, PROBLEM_INTERNAL,
 						 "The optics could not be computed. The log has the reason under %s.", request->id);
-	json_t *answer = work->answer;
+	case OPTICS_OK:
+		break;
+	}
+	struct MHD_Response *response = response_create(work->answer, strlen(work->answer));
 	work->answer = NULL;
-	return response_send_json(request, MHD_HTTP_OK, answer, CACHE_KEEP);
+	return send_optics(request, MHD_HTTP_OK, response);
 }
 
 enum MHD_Result route_optics(struct request *request)
@@ -173,16 +242,23 @@ enum MHD_Result route_optics(struct request *request)
 	if (!work)
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
 	work->request = request;
-	work->work.run = compute;
+	work->work.run = run;
 	request->work = work;
 	request->work_destroy = work_destroy;
 	read_parameters(request, work);
 	work->deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);
+	if (!set_tag(work, request->service))
+		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
+	if (entity_tag_matches(request_header(request, "If-None-Match"), work->tag))
+		return send_optics(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
+	if (request->is_head)
+		return send_optics(request, MHD_HTTP_OK, response_create_unsized());
+	work->queued_ms = clock_now_ms();
 	/* Suspended first: a worker may be done before worker_pool_try returns. */
 	request_suspend(request, finish);
-	if (!worker_pool_try(request->service->workers, &work->work)) {
+	if (!worker_pool_try(request->service->computers, &work->work)) {
 		work->refused = true;
 		request_resume(request);
 	}

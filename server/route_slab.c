@@ -86,7 +86,8 @@ static enum MHD_Result send_refusal(struct request *request)
 	if (is_tracing(request->work))
 		return response_send_new_problem(request, PROBLEM_TRACINGS_FULL, "%d photon tracings are waiting, and no more may.",
 						 SERVICE_TRACINGS_MAX);
-	return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "The workers are busy.");
+	return response_send_new_problem(request, PROBLEM_COMPUTERS_FULL, "%d such calls are waiting, and no more may.",
+					 request->service->config->queue_length);
 }
 
 static enum MHD_Result finish(struct request *request)
@@ -181,7 +182,7 @@ static void evaluate(struct slab_work *work)
 	struct timings *timings = &work->request->timings;
 	struct paper_fit_table fit;
 	enum droplet_source source, fit_source = DROPLETS_FROM_MEMORY;
-	double start = clock_now_ms();
+	const double start = clock_now_ms();
 	const struct droplet_tables *tables = droplet_store_get(store, &scene->dsd, scene->model.optics, &source);
 	bool good = tables != NULL;
 	if (good && work->query.method == SLAB_BY_PAPER)
@@ -192,6 +193,7 @@ static void evaluate(struct slab_work *work)
 		compute_with(work, tables, &fit);
 	if (tables)
 		droplet_store_release(store, tables);
+	work->request->service->computing_ms = clock_now_ms() - start;
 }
 
 static void count(const struct slab_work *work)
@@ -236,7 +238,7 @@ static enum MHD_Result enqueue(struct request *request)
 	work->queued_ms = clock_now_ms();
 	/* Suspended first: a worker may be done before worker_pool_try returns. */
 	request_suspend(request, finish);
-	if (!worker_pool_try(is_tracing(work) ? service->tracers : service->workers, &work->work)) {
+	if (!worker_pool_try(is_tracing(work) ? service->tracers : service->computers, &work->work)) {
 		work->refused = true;
 		request_resume(request);
 	}

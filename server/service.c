@@ -17,7 +17,7 @@
 #define HANG_MS 300000.0
 
 /* Tracing photons takes what rendering and encoding leave. */
-enum { TRACER_NICE = 10 };
+enum { COMPUTER_COUNT = 2, COMPUTER_NICE = 5, TRACER_NICE = 10 };
 
 static size_t worker_count(const struct config *config)
 {
@@ -79,8 +79,10 @@ struct service *service_create(const struct config *config)
 	service->metrics = metrics_create();
 	service->queue = render_queue_create((size_t)config->queue_length);
 	service->workers = worker_pool_create(workers, 2 * workers, 0);
+	service->computers = worker_pool_create(COMPUTER_COUNT, (size_t)config->queue_length, COMPUTER_NICE);
 	service->tracers = worker_pool_create(1, SERVICE_TRACINGS_MAX, TRACER_NICE);
-	if (service->metrics && service->queue && service->workers && service->tracers && http_start(service) && start_rendering(service))
+	const bool pools = service->workers && service->computers && service->tracers;
+	if (service->metrics && service->queue && pools && http_start(service) && start_rendering(service))
 		return service;
 	service_destroy(service);
 	return NULL;
@@ -144,6 +146,7 @@ void service_destroy(struct service *service)
 		render_queue_close(service->queue);
 	render_thread_destroy(service->render_thread);
 	worker_pool_destroy(service->workers);
+	worker_pool_destroy(service->computers);
 	worker_pool_destroy(service->tracers);
 	render_queue_destroy(service->queue);
 	metrics_destroy(service->metrics);
@@ -183,9 +186,16 @@ unsigned service_retry_seconds(const struct service *service)
 	return whole_seconds(milliseconds);
 }
 
+unsigned service_computing_retry_seconds(const struct service *service)
+{
+	return whole_seconds((double)worker_pool_waiting(service->computers) * service->computing_ms / COMPUTER_COUNT);
+}
+
+/* Before the first has ended a tracing is taken for one that fills the usual deadline. */
 unsigned service_tracing_retry_seconds(const struct service *service)
 {
-	return whole_seconds(service->tracing_ms);
+	const double each = service->tracing_ms > 0 ? service->tracing_ms : service->config->timeout_ms;
+	return whole_seconds((double)(1 + worker_pool_waiting(service->tracers)) * each);
 }
 
 bool service_refuses(struct request *request)

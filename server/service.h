@@ -31,8 +31,9 @@ struct service {
 	struct render_queue *queue;
 	struct render_thread *_Atomic render_thread;
 	struct preparation *preparation; /* once ready */
-	struct worker_pool *workers;
-	struct worker_pool *tracers; /* one thread that traces photons, on all processors, behind everything else */
+	struct worker_pool *workers;     /* encode images: the render thread waits for them, so nothing slow runs here */
+	struct worker_pool *computers;   /* droplets and layers for their own calls, behind the pictures */
+	struct worker_pool *tracers;     /* one thread that traces photons, on all processors, behind everything else */
 	struct MHD_Daemon *daemon;
 	const struct image_api *images;
 	char *pixel_version; /* everything but the question that decides about an answer's bytes */
@@ -40,12 +41,13 @@ struct service {
 	unsigned port;
 	int listening_socket; /* taken from libmicrohttpd while stopping; else negative */
 
-	_Atomic size_t in_flight;  /* requests read to their end and not answered to theirs */
-	_Atomic size_t suspended;  /* those of them that others work for */
-	_Atomic double tracing_ms; /* what the last tracing took */
-	_Atomic bool ready;        /* has been ready to render */
-	_Atomic bool stopping;     /* takes no new work */
-	_Atomic bool giving_up;    /* drops the accepted work too */
+	_Atomic size_t in_flight;    /* requests read to their end and not answered to theirs */
+	_Atomic size_t suspended;    /* those of them that others work for */
+	_Atomic double tracing_ms;   /* what the last tracing took */
+	_Atomic double computing_ms; /* what the last call did that computers worked for */
+	_Atomic bool ready;          /* has been ready to render */
+	_Atomic bool stopping;       /* takes no new work */
+	_Atomic bool giving_up;      /* drops the accepted work too */
 };
 
 /* Starts serving; rendering comes up behind. NULL (and a log line) on failure, such as an address in use. Main thread. */
@@ -65,8 +67,9 @@ size_t service_queue_depth(const struct service *service);
 
 /* A guess at when the queue has room again, from 1. Any thread. */
 unsigned service_retry_seconds(const struct service *service);
-/* Likewise for photon tracings. */
+/* Likewise for photon tracings, and for calls that compute droplets and layers. */
 unsigned service_tracing_retry_seconds(const struct service *service);
+unsigned service_computing_retry_seconds(const struct service *service);
 
 /* States why the service takes no work at present and counts it. false when it does take work. HTTP thread. */
 struct request;

@@ -21,6 +21,9 @@ const char *const slab_phase_names[] = {"full", "modified", NULL};
 /* Most steps of a tracing, of some 0.05 us each: ten minutes of one processor, whatever the deadline. */
 #define TRACING_STEPS_MAX 1e10
 
+/* The default is what is traced in some ten seconds of one processor, within the usual deadline. */
+#define DEFAULT_SHARE (1.0 / 60)
+
 enum { POINTER_SIZE = 512 };
 
 enum parameter {
@@ -226,7 +229,7 @@ static void check_photons(struct slab_query *query, struct problem *problem)
 	if (query->method != SLAB_BY_PHOTONS && is_given(query, SEED))
 		problem_add(problem, "/seed", alone);
 	if (!is_given(query, PHOTONS))
-		query->photons = fmin(query->photons, most);
+		query->photons = fmin(query->photons, fmax(floor(DEFAULT_SHARE * most), 1));
 	if (query->method == SLAB_BY_PHOTONS && problem->kind == PROBLEM_NONE && query->photons > most)
 		problem_add(problem, "/photons", "must be at most %.0f for a layer this thick and %d directions", most,
 			    query->view_count * query->azimuth_count);

@@ -15,8 +15,8 @@ SMALL = {"width": 16, "height": 16}
 
 
 def scene(gamma, **sections):
-    """Small and without clouds, so that all its work is the droplets'."""
-    return {"dsd": {"gamma": gamma}, "clouds": {"type": "none"}, "output": SMALL, **sections}
+    """Small, with a coarse field, so that most of its work is the droplets'."""
+    return {"dsd": {"gamma": gamma}, "clouds": {"resolution": 64}, "output": SMALL, **sections}
 
 
 def computed(daemon):
@@ -61,6 +61,59 @@ def test_computed_once(daemon):
     assert len({a.body for a in answers}) == 1
     assert computed(daemon) - before == 2 * one
     assert daemon.metric("stratus_droplet_tables_bytes") > 2 * 15e6
+
+
+def test_clear_sky_needs_none(daemon):
+    before = computed(daemon)
+    assert daemon.render(scene(3.25, clouds={"type": "none"})).status == 200
+    assert daemon.render(scene(3.26, clouds={"thickness_m": 0})).status == 200
+    assert computed(daemon) == before
+
+
+@pytest.mark.parametrize("path", ["/v1/slab?optical_thickness=8&", "/v1/optics?"])
+def test_calls_share_one_computation(daemon, path):
+    before = computed(daemon)
+    query = path + "dsd.gamma=3.27" + ("1" if "slab" in path else "2")
+    with concurrent.futures.ThreadPoolExecutor(16) as pool:
+        answers = list(pool.map(lambda _: daemon.get(query), range(16)))
+    assert {a.status for a in answers} == {200}
+    assert len({a.body for a in answers}) == 1
+    assert computed(daemon) - before == (1 if "slab" in path else 2)  # tables, and the paper's fit
+
+
+def test_pictures_go_on_beside_calls(daemon):
+    """Encoding has threads of its own: calls that compute droplets do not keep pictures waiting."""
+    stop = threading.Event()
+
+    def ask(k):
+        for i in range(1000):
+            if stop.is_set():
+                return
+            assert daemon.get(f"/v1/slab?optical_thickness=8&dsd.gamma={4 + k + i / 1000}").status == 200
+
+    daemon.render(scene(3.1))
+    threads = [threading.Thread(target=ask, args=(k,)) for k in range(8)]
+    for thread in threads:
+        thread.start()
+    try:
+        time.sleep(0.3)
+        took = []
+        for i in range(12):
+            begin = time.monotonic()
+            assert daemon.render(scene(3.1, camera={"azimuth_deg": 1 + i})).status == 200
+            took.append(time.monotonic() - begin)
+    finally:
+        stop.set()
+        for thread in threads:
+            thread.join()
+    # Behind eight computations of 0.1 s and more in one line it would be near a second.
+    assert statistics.median(took) < 0.25, took
+
+
+def test_optics_nobody_waits_for(daemon):
+    before = computed(daemon)
+    assert daemon.get("/v1/optics?dsd.gamma=3.29", **{"X-Timeout-Ms": "1"}).status == 504
+    assert computed(daemon) - before <= 1  # and no fit after the tables
 
 
 def test_timing_says_where_they_came_from(daemon):

@@ -485,7 +485,7 @@ def test_photon_budget(daemon):
         assert daemon.head(target(shading="montecarlo", photons=most, **layer)).status == 200
         assert daemon.head(target(shading="montecarlo", photons=most + 1, **layer)).status == 422
         unsaid = daemon.head(target(shading="montecarlo", **layer))
-        said = daemon.head(target(shading="montecarlo", photons=min(100000, most), **layer))
+        said = daemon.head(target(shading="montecarlo", photons=min(100000, max(1, most // 60)), **layer))
         assert unsaid.status == 200 and unsaid.headers["ETag"] == said.headers["ETag"]
     assert daemon.head(target(optical_thickness=8, shading="montecarlo", photons=10000000)).status == 200
 

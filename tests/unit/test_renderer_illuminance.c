@@ -61,8 +61,7 @@ static void clear_skies_add_up(void **state)
 			static const double rayleigh[3] = {0.0471, 0.0930, 0.2115}, nm[3] = {650, 550, 450};
 			double bands[3];
 			for (int band = 0; band < 3; band++)
-				bands[band] =
-					colour_solar_irradiance[band] * exp(-rayleigh[band] - 0.1 * pow(nm[band] / 550, -0.8));
+				bands[band] = colour_solar_irradiance[band] * exp(-rayleigh[band] - 0.1 * pow(nm[band] / 550, -0.8));
 			assert_in_range(1000 * frame.direct_illuminance_lux / colour_luminance(bands), 940, 1000);
 		}
 		frame_finish(&frame);

@@ -55,7 +55,8 @@ static void print_text(json_t *info)
 	json_t *value;
 	print_name("image");
 	printf("%s, %lld x %lld\n", json_string_value(json_object_get(info, "format")),
-	       (long long)json_integer_value(json_object_get(info, "width")), (long long)json_integer_value(json_object_get(info, "height")));
+	       (long long)json_integer_value(json_object_get(info, "width")),
+	       (long long)json_integer_value(json_object_get(info, "height")));
 	print_channels(json_object_get(info, "channels"));
 	json_object_foreach(json_object_get(info, "attributes"), name, value) print_value(name, value);
 	if (json_object_get(info, "scene")) {

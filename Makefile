@@ -2,6 +2,7 @@
 # make test   installs what tests need, builds, runs all tests
 # make demo   four pictures into out/, with their timings
 # make validate   measures the bounds of the optics and draws the paper's figures into docs/validation/, some minutes
+# make gallery   draws the pictures of docs/gallery
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
 
 SHELL := /bin/bash
@@ -26,6 +27,7 @@ PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-
 	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr clang-format procps
 VALIDATE_PACKAGES := gnuplot-nox
+GALLERY_PACKAGES := imagemagick
 
 pkg = $(shell pkg-config $(1) $(2))
 RENDERER_LIBS = $(call pkg,--libs,epoxy libxxhash cminpack) -lEGL -lm
@@ -48,7 +50,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel run test demo validate unit http format clean packages test-packages
+.PHONY: all programs kernel run test demo gallery validate unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -147,6 +149,12 @@ demo: packages
 test: test-packages
 	@$(MAKE) --no-print-directory -j$$(nproc) programs unit && $(MAKE) --no-print-directory kernel
 	@scripts/test.sh $(B)
+
+# PICTURES="name name" draws these alone.
+gallery: packages
+	@scripts/packages.sh $(GALLERY_PACKAGES)
+	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
+	@scripts/gallery.sh $(B) $(PICTURES)
 
 validate: packages
 	@scripts/packages.sh $(VALIDATE_PACKAGES)

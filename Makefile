@@ -99,6 +99,8 @@ $(B)/renderer/optics/paper_fit_solve.c.o: CFLAGS += $(call pkg,--cflags,cminpack
 # The optics are the one place where the compiler's best vector code is worth asking for: nobody there reads errno or traps.
 OPTICS_OPT := -O3 -g -ffp-contract=fast -fno-math-errno -fno-trapping-math
 $(B)/renderer/optics/%.c.o: OPT := $(OPTICS_OPT)
+# The exchange between ground and clouds likewise.
+$(B)/renderer/stages/fourier.c.o $(B)/renderer/stages/exchange.c.o $(B)/renderer/stages/radiosity_solve.c.o: OPT := $(OPTICS_OPT)
 
 # Files of what the optics computed say by which sources, compiler, flags and solver.
 OPTICS_TEXT := $(wildcard renderer/optics/*.[ch]) Makefile

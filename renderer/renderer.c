@@ -398,6 +398,7 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	const enum render_result result = run_stages(&job);
 	frame->radiosity_passes = job.light.passes;
 	frame->radiosity_residual = job.light.residual;
+	memcpy(frame->radiosity_residuals, job.light.residuals, sizeof frame->radiosity_residuals);
 	texture_finish(&job.developed);
 	droplets_release(&renderer->context);
 	if (result != RENDER_OK) {

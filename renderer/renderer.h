@@ -46,6 +46,8 @@ struct stage_timing {
 
 enum pixel_type { PIXEL_U8, PIXEL_U16, PIXEL_F32 };
 
+enum { RADIOSITY_PASSES_LISTED = 32 };
+
 /* One rendered picture: `layer_count` planes of height x width x channels, rows from the top, channels interleaved. */
 struct frame {
 	int width, height;
@@ -57,12 +59,13 @@ struct frame {
 	size_t bytes;
 
 	struct stage_timing timing[STAGE_COUNT];
-	int radiosity_passes;
-	double radiosity_residual;      /* relative energy left when the exchange stopped, 0 when not run */
-	double exposure_ev;             /* what multiplied the picture: 2^exposure_ev, also when automatic */
-	double global_illuminance_lux;  /* horizontal, at the camera: direct + diffuse */
-	double direct_illuminance_lux;  /* horizontal, at the camera; mean over the cloud tile below the clouds */
-	double diffuse_illuminance_lux; /* horizontal, at the camera */
+	int radiosity_passes;      /* 0 when not run */
+	double radiosity_residual; /* light on its way when the exchange stopped, over what the ground receives; 0 when not run */
+	double radiosity_residuals[RADIOSITY_PASSES_LISTED]; /* the same after each of the first passes */
+	double exposure_ev;                                  /* what multiplied the picture: 2^exposure_ev, also when automatic */
+	double global_illuminance_lux;                       /* horizontal, at the camera: direct + diffuse */
+	double direct_illuminance_lux;                       /* horizontal, at the camera; mean over the cloud tile below the clouds */
+	double diffuse_illuminance_lux;                      /* horizontal, at the camera */
 };
 
 struct renderer;

@@ -278,53 +278,62 @@ static const struct height_field *height_field_get(const struct field_stage *sta
 	return field;
 }
 
-static void texture_destroy(void *value)
+struct thickness_field {
+	struct texture thickness, smooth;
+};
+
+static void thickness_field_destroy(void *value)
 {
-	struct texture *texture = value;
-	if (texture)
-		texture_finish(texture);
-	free(texture);
+	struct thickness_field *field = value;
+	if (!field)
+		return;
+	texture_finish(&field->smooth);
+	texture_finish(&field->thickness);
+	free(field);
 }
 
-static struct texture *smooth_compute(const struct field_stage *stage, const struct coarse_field *coarse, double length_m)
+static struct thickness_field *thickness_field_compute(const struct field_stage *stage, const struct coarse_field *coarse, double length_m)
 {
-	struct texture height = {0}, *smooth = calloc(1, sizeof *smooth);
-	if (!smooth || !height_compute(stage, coarse, SMOOTH_SIDE, &height) ||
-	    !texture_init(smooth, SMOOTH_SIDE, SMOOTH_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
-		texture_finish(&height);
-		free(smooth);
+	struct thickness_field *field = calloc(1, sizeof *field);
+	if (!field || !height_compute(stage, coarse, SMOOTH_SIDE, &field->thickness) ||
+	    !texture_init(&field->smooth, SMOOTH_SIDE, SMOOTH_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
+		thickness_field_destroy(field);
 		return NULL;
 	}
-	pass_run(stage->passes[PASS_SMOOTH], &(struct pass_run){.targets = (struct texture *[]){smooth},
-								.samplers = {&height},
+	pass_run(stage->passes[PASS_SMOOTH], &(struct pass_run){.targets = (struct texture *[]){&field->smooth},
+								.samplers = {&field->thickness},
 								.arguments = {{SMOOTH_SIDE, (float)length_m}}});
-	texture_build_mipmaps(smooth);
-	texture_finish(&height);
-	return smooth;
+	texture_build_mipmaps(&field->smooth);
+	return field;
 }
 
-static const struct texture *smooth_get(const struct field_stage *stage, struct stage_context *context, const struct scene *scene,
-					const struct coarse_field *coarse)
+static const struct thickness_field *thickness_field_get(const struct field_stage *stage, struct stage_context *context,
+							 const struct scene *scene, const struct coarse_field *coarse)
 {
 	const double length = context->block.slab_light[2];
 	struct cache_key key = thickness_key("smooth", &scene->clouds);
 	cache_key_add(&key, length);
-	struct texture *smooth = cache_find(context->cache, &key);
-	if (smooth)
-		return smooth;
+	struct thickness_field *field = cache_find(context->cache, &key);
+	if (field)
+		return field;
 	context->reused = false;
-	smooth = smooth_compute(stage, coarse, length);
-	if (!smooth || !cache_keep(context->cache, &key, smooth, texture_bytes(smooth), texture_destroy))
+	field = thickness_field_compute(stage, coarse, length);
+	if (!field || !cache_keep(context->cache, &key, field, texture_bytes(&field->thickness) + texture_bytes(&field->smooth),
+				  thickness_field_destroy))
 		return NULL;
-	return smooth;
+	return field;
 }
 
 static bool thickness_get(const struct field_stage *stage, struct stage_context *context, const struct scene *scene,
 			  const struct coarse_field *coarse, bool from_above, struct field_maps *maps)
 {
-	maps->smooth = smooth_get(stage, context, scene, coarse);
-	if (!maps->smooth || !from_above)
-		return maps->smooth;
+	const struct thickness_field *thickness = thickness_field_get(stage, context, scene, coarse);
+	if (!thickness)
+		return false;
+	maps->thickness = &thickness->thickness;
+	maps->smooth = &thickness->smooth;
+	if (!from_above)
+		return true;
 	const struct height_field *height = height_field_get(stage, context, scene, coarse);
 	if (!height)
 		return false;

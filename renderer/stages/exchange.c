@@ -128,7 +128,8 @@ static void multiply(const struct exchange *exchange, float sign, float *restric
 void exchange_receive(struct exchange *exchange, enum exchange_way way, const float *sends, float *received)
 {
 	static const float signs[] = {[EXCHANGE_DOWN] = 1, [EXCHANGE_UP] = -1, [EXCHANGE_LEVEL] = 0};
-	const size_t count = (size_t)exchange->fourier.side * (size_t)exchange->fourier.side, bytes = EXCHANGE_BANDS * count * sizeof *sends;
+	const size_t count = (size_t)exchange->fourier.side * (size_t)exchange->fourier.side,
+		     bytes = EXCHANGE_BANDS * count * sizeof *sends;
 	float *scratch = exchange->scratch;
 	/* Two real pictures make a complex one; the kernel is real and keeps them apart. The fourth is zero. */
 	memcpy(scratch, sends, bytes);

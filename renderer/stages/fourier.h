@@ -13,8 +13,8 @@ struct fourier {
 /* side: a power of two, 2..FOURIER_SIDE_MAX. */
 void fourier_init(struct fourier *fourier, int side);
 
-/* sum over x, y of f(x, y) exp(-2 pi i (kx x + ky y) / side). re, im, apart in memory: side x side, rows of x before, of ky after: the value of (kx, ky)
- * stands where fourier_frequency(row) = kx and fourier_frequency(column) = ky. */
+/* sum over x, y of f(x, y) exp(-2 pi i (kx x + ky y) / side). re, im, apart in memory: side x side, rows of x before, of ky after: the
+ * value of (kx, ky) stands where fourier_frequency(row) = kx and fourier_frequency(column) = ky. */
 void fourier_forward(const struct fourier *fourier, float *re, float *im);
 
 /* Back, side^2 times what it was. */

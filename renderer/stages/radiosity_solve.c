@@ -62,8 +62,7 @@ static void start(struct work *work)
 	memcpy(work->way, work->residual, (size_t)values * sizeof *work->way);
 	for (int band = 0; band < EXCHANGE_BANDS; band++) {
 		const int at = band * work->count;
-		work->norm[band] =
-			inner(work->planes->cloud_albedo + at, work->residual + at, work->residual + at, work->count);
+		work->norm[band] = inner(work->planes->cloud_albedo + at, work->residual + at, work->residual + at, work->count);
 	}
 }
 
@@ -107,7 +106,8 @@ static double relative_residual(const struct work *work)
 			squares += still * still;
 			sent += (double)(albedo[i] * irradiance[i]) + still;
 		}
-		const double received = mean(work->first + at, work->count) + mean(work->planes->direct + at, work->count) + sent / work->count;
+		const double received =
+			mean(work->first + at, work->count) + mean(work->planes->direct + at, work->count) + sent / work->count;
 		if (received > 0)
 			largest = fmax(largest, sqrt(squares / work->count) / received);
 	}

@@ -29,9 +29,9 @@ struct radiosity_solution {
 	double last_residual;                     /* 0 without passes */
 };
 
-/* Stops when the residual is within tolerance or after max_passes. The first pass takes the ground's light up to the base; without any, only
- * what the base sends by itself reaches the ground. Residual: light still on its way from base to ground, root mean square over the tile,
- * over the mean of all that the ground receives; the largest of the bands. false when out of memory. */
+/* Stops when the residual is within tolerance or after max_passes. The first pass takes the ground's light up to the base; without any,
+ * only what the base sends by itself reaches the ground. Residual: light still on its way from base to ground, root mean square over the
+ * tile, over the mean of all that the ground receives; the largest of the bands. false when out of memory. */
 bool radiosity_solve(struct exchange *exchange, const struct radiosity_planes *planes, double tolerance, int max_passes,
 		     struct radiosity_solution *solution);
 

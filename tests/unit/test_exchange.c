@@ -219,8 +219,7 @@ static void squares_of_texels_are_exact(void **state)
 						const int x = side / 2 + (i * side / 48), y = side / 2 + i % 5 * side / 16;
 						const double wanted = periodic_square(a * texel, (x + 0.5 - side / 2) * texel,
 										      (y + 0.5 - side / 2) * texel, side * texel);
-						const double found =
-							(double)planes.values[(band * side + y) * side + x] / (band + 1);
+						const double found = (double)planes.values[(band * side + y) * side + x] / (band + 1);
 						worst = fmax(worst, fabs(found - wanted));
 					}
 			}
@@ -304,7 +303,8 @@ static void drift_moves_the_base(void **state)
 			exchange_receive(&planes.exchange, up ? EXCHANGE_UP : EXCHANGE_DOWN, planes.values, planes.values);
 			for (double u = -9; u < 9; u += 0.7) {
 				const double at_x = up ? side + 0.4 - x : x, at_y = up ? side + 0.2 - y : y;
-				const double found = read_at(&planes, 2, fmod(at_x + u + 2 * side, side), fmod(at_y + u / 2 + 2 * side, side));
+				const double found =
+					read_at(&planes, 2, fmod(at_x + u + 2 * side, side), fmod(at_y + u / 2 + 2 * side, side));
 				worst = fmax(worst, fabs(found / 3 - periodic_square(5 * texel, u * texel, u / 2 * texel, side * texel)));
 			}
 		}
@@ -340,10 +340,10 @@ static void ways_down_and_up_are_the_same(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(transform_is_the_sum_it_says),   cmocka_unit_test(transforms_come_back),
-		cmocka_unit_test(kernel_has_its_transform),       cmocka_unit_test(analytic_values_are_known),
-		cmocka_unit_test(squares_of_texels_are_exact),    cmocka_unit_test(squares_have_their_form_factor),
-		cmocka_unit_test(nothing_is_created_or_lost),     cmocka_unit_test(drift_moves_the_base),
+		cmocka_unit_test(transform_is_the_sum_it_says),  cmocka_unit_test(transforms_come_back),
+		cmocka_unit_test(kernel_has_its_transform),      cmocka_unit_test(analytic_values_are_known),
+		cmocka_unit_test(squares_of_texels_are_exact),   cmocka_unit_test(squares_have_their_form_factor),
+		cmocka_unit_test(nothing_is_created_or_lost),    cmocka_unit_test(drift_moves_the_base),
 		cmocka_unit_test(ways_down_and_up_are_the_same),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -253,14 +253,10 @@ static void darkness_stays_dark(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(solution_is_the_sum_of_all_bounces),
-		cmocka_unit_test(uniform_planes_close_the_series),
-		cmocka_unit_test(white_ground_does_not_diverge),
-		cmocka_unit_test(what_comes_in_stays_or_leaves),
-		cmocka_unit_test(tolerance_and_passes_mean_what_they_say),
-		cmocka_unit_test(residual_bounds_the_error),
-		cmocka_unit_test(no_passes_leave_the_first_light),
-		cmocka_unit_test(darkness_stays_dark),
+		cmocka_unit_test(solution_is_the_sum_of_all_bounces),      cmocka_unit_test(uniform_planes_close_the_series),
+		cmocka_unit_test(white_ground_does_not_diverge),           cmocka_unit_test(what_comes_in_stays_or_leaves),
+		cmocka_unit_test(tolerance_and_passes_mean_what_they_say), cmocka_unit_test(residual_bounds_the_error),
+		cmocka_unit_test(no_passes_leave_the_first_light),         cmocka_unit_test(darkness_stays_dark),
 	};
 	kernel = exchange_kernel_create(SIDE, tile, base);
 	if (!kernel)

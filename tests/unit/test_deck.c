@@ -1,6 +1,6 @@
 /* A uniform deck over Lambertian ground in whole pictures: against the solver with a reflecting ground, discrete ordinates
- * (tests/data/ground.json), and the balance of all light. And what is left of a sky's light where clouds end. Skipped where no OpenGL context
- * comes up. */
+ * (tests/data/ground.json), and the balance of all light. And what is left of a sky's light where clouds end. Skipped where no OpenGL
+ * context comes up. */
 #include "tests/validate/deck.h"
 
 #include "renderer/log.h"
@@ -122,10 +122,11 @@ static struct scene coast_scene(double tau, double base_m)
 	return scene;
 }
 
-/* Measured under uniform stratus at Palmer Station: in the visible the sky over the island's snow is up to twice as bright as over open ocean,
- * whatever the height of the cloud. (P. Ricchiazzi, A. Payton and C. Gautier 2002, "A test of three-dimensional radiative transfer simulation
- * using the radiance signatures and contrasts at a high latitude coastal site", J. Geophys. Res. 107.) Here the coast is straight, with
- * fresh snow down to the water, so that twice is in the middle of what decks from thin to thick give, at 30 degrees of elevation. */
+/* Measured under uniform stratus at Palmer Station: in the visible the sky over the island's snow is up to twice as bright as over open
+ * ocean, whatever the height of the cloud. (P. Ricchiazzi, A. Payton and C. Gautier 2002, "A test of three-dimensional radiative transfer
+ * simulation using the radiance signatures and contrasts at a high latitude coastal site", J. Geophys. Res. 107.) Here the coast is
+ * straight, with fresh snow down to the water, so that twice is in the middle of what decks from thin to thick give, at 30 degrees of
+ * elevation. */
 static void snow_brightens_the_sky_about_twice(void **state)
 {
 	(void)state;
@@ -139,16 +140,16 @@ static void snow_brightens_the_sky_about_twice(void **state)
 			assert_true(deck_measure_luminance(deck, &scene, place, 270, 30, &snow));
 			assert_true(deck_measure_luminance(deck, &scene, place, 90, 30, &water));
 			contrast[b][t] = snow / water;
-			print_message("tau %2.0f, base %4.0f m: the sky over snow is %.2f times as bright as over water\n", taus[t], bases[b],
-				      snow / water);
+			print_message("tau %2.0f, base %4.0f m: the sky over snow is %.2f times as bright as over water\n", taus[t],
+				      bases[b], snow / water);
 			assert_true(contrast[b][t] > 1.5 && contrast[b][t] < 2.6);
 		}
 	for (int t = 0; t < 3; t++)
 		assert_float_equal(contrast[0][t] / contrast[1][t], 1, 0.05);
 }
 
-/* Across the coast, straight up from below the base. A half plane's form factor is (1 + x/sqrt(h^2 + x^2))/2, which goes from 10 to 90 % over
- * 8/3 h; light that bounces several times over the snow goes farther. */
+/* Across the coast, straight up from below the base. A half plane's form factor is (1 + x/sqrt(h^2 + x^2))/2, which goes from 10 to 90 %
+ * over 8/3 h; light that bounces several times over the snow goes farther. */
 static void transition_is_as_wide_as_the_base_is_high(void **state)
 {
 	(void)state;
@@ -170,7 +171,6 @@ static void transition_is_as_wide_as_the_base_is_high(void **state)
 		print_message("base %3.0f m: contrast %.2f far off, from 90 to 10 %% over %.2f h\n", base, light[0] / light[STEPS - 1],
 			      at[1] - at[0]);
 		assert_true(at[1] - at[0] > 8 / 3.0 && at[1] - at[0] < 5);
-		
 	}
 }
 

@@ -22,8 +22,8 @@ enum { PICTURE_SIDE = 16, LAYERS = 9, VIEW_NODES = 12, AZIMUTHS = 12 };
 const double deck_views[2] = {0, 30};
 
 /* All that the layer sends to the camera but for what is seen through it; then what is. */
-static const enum layer layers[LAYERS] = {LAYER_ORDER0,    LAYER_ORDER1,       LAYER_ORDER2, LAYER_MULTIPLE,
-					  LAYER_CLOUD_SKY, LAYER_CLOUD_GROUND, LAYER_GROUND, LAYER_AIR, LAYER_SKY};
+static const enum layer layers[LAYERS] = {LAYER_ORDER0,       LAYER_ORDER1, LAYER_ORDER2, LAYER_MULTIPLE, LAYER_CLOUD_SKY,
+					  LAYER_CLOUD_GROUND, LAYER_GROUND, LAYER_AIR,    LAYER_SKY};
 enum { OWN_LAYERS = 6, GROUND_LAYER = 6, AIR_LAYER = 7 };
 
 struct deck {
@@ -124,9 +124,9 @@ static void remove_shaders(struct deck *deck)
 static bool stages_init(struct deck *deck, bool uniform)
 {
 	const struct pass_compiler compiler = {.kind = PASS_FRAGMENT, .shader_dir = uniform ? deck->folder : NULL};
-	return (!uniform || write_shaders(deck)) && ground_stage_init(&deck->ground, &compiler) &&
-	       sky_stage_init(&deck->sky, &compiler) && field_stage_init(&deck->field, &compiler) &&
-	       radiosity_stage_init(&deck->radiosity, &compiler) && view_stage_init(&deck->view, &compiler);
+	return (!uniform || write_shaders(deck)) && ground_stage_init(&deck->ground, &compiler) && sky_stage_init(&deck->sky, &compiler) &&
+	       field_stage_init(&deck->field, &compiler) && radiosity_stage_init(&deck->radiosity, &compiler) &&
+	       view_stage_init(&deck->view, &compiler);
 }
 
 struct deck *deck_create(const struct kernel *kernel, bool uniform)
@@ -214,8 +214,7 @@ static bool make(struct deck *deck, const struct scene *scene, struct made *made
 		return false;
 	/* What the air above gets back: ground and deck together. */
 	for (int band = 0; band < BAND_COUNT; band++) {
-		const double r = slab_spherical_albedo(deck->slab, band,
-						       scene->clouds.thickness_m * deck->optics->extinction_per_m[band]),
+		const double r = slab_spherical_albedo(deck->slab, band, scene->clouds.thickness_m * deck->optics->extinction_per_m[band]),
 			     ground = made->ground.mean[band];
 		albedo[band] = r + (1 - r) * (1 - r) * ground / (1 - r * ground);
 	}
@@ -363,8 +362,8 @@ void deck_expect(const struct deck *deck, const struct scene *scene, const struc
 	for (int band = 0; band < BAND_COUNT; band++) {
 		const double tau = scene->clouds.thickness_m * deck->optics->extinction_per_m[band], albedo = scene->ground.albedo[band];
 		const double back = slab_spherical_albedo(deck->slab, band, tau);
-		const double first = slab_flux_at(deck->slab, band, tau, mu_l).transmitted * measured->beam[band] +
-				     (1 - back) * measured->sky[band];
+		const double first =
+			slab_flux_at(deck->slab, band, tau, mu_l).transmitted * measured->beam[band] + (1 - back) * measured->sky[band];
 		expected->ground[band] = first / (1 - albedo * back);
 		for (int view = 0; view < 2; view++) {
 			const double mu_v = cos(deck_views[view] * DEGREE);

@@ -129,6 +129,7 @@ $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(RENDERER_LIBS)
 $(B)/tests/test_validate_bounds: $(call obj,tests/validate/bounds.c)
 $(B)/tests/test_deck: $(call obj,tests/validate/deck.c)
+$(B)/tests/test_exchange: $(call obj,tests/validate/squares.c)
 
 -include $(shell find $(B) -name '*.d' 2>/dev/null)
 

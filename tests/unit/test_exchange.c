@@ -1,6 +1,7 @@
 /* Exchange of light between parallel planes: the transform against its definition, the kernel against its own transform's closed form,
  * squares against their form factor at every ratio of tile, texel and distance that a scene may have. */
 #include "renderer/stages/exchange.h"
+#include "tests/validate/squares.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -168,39 +169,16 @@ static void put_square(struct planes *planes, double a, double x, double y)
 				(float)((band + 1) * cover(i % side, x - a, x + a) * cover(i / side, y - a, y + a));
 }
 
-/* Form factor of a square of half-width a at the origin, seen from (x, y); lengths over h. */
-static double square(double a, double x, double y)
-{
-	return exchange_corner_factor(a - x, a - y) + exchange_corner_factor(a + x, a - y) + exchange_corner_factor(a - x, a + y) +
-	       exchange_corner_factor(a + x, a + y);
-}
-
-/* With all periodic images; those beyond are as good as uniform. */
-static double periodic_square(double a, double x, double y, double tile)
-{
-	const int images = (int)fmin(60, 4 + 16 / tile);
-	double sum = 0;
-	for (int i = -images; i <= images; i++)
-		for (int k = -images; k <= images; k++)
-			sum += square(a, x + i * tile, y + k * tile);
-	return sum + (1 - square((images + 0.5) * tile, 0, 0)) * (4 * a * a) / (tile * tile);
-}
-
 static void analytic_values_are_known(void **state)
 {
 	(void)state;
 	/* Centred squares of half-width h/2, h, 2h, 4h, 8h. */
 	static const double halves[] = {0.5, 1, 2, 4, 8}, wanted[] = {0.239, 0.554, 0.831, 0.951, 0.987};
 	for (int i = 0; i < 5; i++)
-		assert_float_equal(square(halves[i], 0, 0), wanted[i], 6e-4);
+		assert_float_equal(square_factor(halves[i], 0, 0), wanted[i], 6e-4);
 }
 
 static const double tiles_m[] = {2000, 20000, 63000, 200000}, bases_m[] = {100, 350, 1200, 4000, 12000};
-static const double halves[] = {0.5, 1, 2, 4, 8, 16};
-
-/* Where a square is judged, in half-widths from its centre: centre, edge, corner, outside across an edge, over the corner and far off. */
-static const double points[][2] = {{0, 0}, {1, 0}, {1, 1}, {1.5, 0}, {1.5, 1.5}, {2, 0.4}};
-
 /* Whatever the ratio of texel and distance, squares made of whole texels are exact in front of the texels' centres. */
 static void squares_of_texels_are_exact(void **state)
 {
@@ -217,8 +195,8 @@ static void squares_of_texels_are_exact(void **state)
 				for (int band = 0; band < EXCHANGE_BANDS; band++)
 					for (int i = 0; i < 24; i++) {
 						const int x = side / 2 + (i * side / 48), y = side / 2 + i % 5 * side / 16;
-						const double wanted = periodic_square(a * texel, (x + 0.5 - side / 2) * texel,
-										      (y + 0.5 - side / 2) * texel, side * texel);
+						const double wanted = square_factor_periodic(a * texel, (x + 0.5 - side / 2) * texel,
+											     (y + 0.5 - side / 2) * texel, side * texel);
 						const double found = (double)planes.values[(band * side + y) * side + x] / (band + 1);
 						worst = fmax(worst, fabs(found - wanted));
 					}
@@ -233,27 +211,18 @@ static void squares_of_texels_are_exact(void **state)
 static void squares_have_their_form_factor(void **state)
 {
 	(void)state;
+	static const double halves[] = {0.5, 1, 2, 4, 8, 16};
 	for (size_t t = 0; t < sizeof tiles_m / sizeof *tiles_m; t++)
 		for (size_t b = 0; b < sizeof bases_m / sizeof *bases_m; b++) {
-			struct planes planes = planes_make(tiles_m[t], bases_m[b], 0, 0);
-			const double texel = tiles_m[t] / planes.side / bases_m[b];
-			const bool fine = texel <= 1 / 3.0;
-			double worst = 0;
+			double worst = 0, texel = 0;
 			for (size_t i = 0; i < sizeof halves / sizeof *halves; i++) {
-				const double a = fine ? fmin(halves[i] / texel, 0.4 / 16 * halves[i] * planes.side) : 2 * halves[i];
-				const double x = planes.side / 2 + (fine ? 0.37 : 0), y = planes.side / 2 - (fine ? 0.21 : 0);
-				put_square(&planes, a, x, y);
-				exchange_receive(&planes.exchange, EXCHANGE_LEVEL, planes.values, planes.values);
-				for (size_t p = 0; p < sizeof points / sizeof *points; p++) {
-					const double u = points[p][0] * a, v = points[p][1] * a;
-					const double wanted = periodic_square(a * texel, u * texel, v * texel, planes.side * texel);
-					worst = fmax(worst, fabs(read_at(&planes, 1, x + u, y + v) / 2 - wanted));
-				}
+				const double error = square_error(tiles_m[t], bases_m[b], halves[i], &texel);
+				assert_true(error >= 0);
+				worst = fmax(worst, error);
 			}
-			print_message("tile %6.0f m, base %5.0f m: %3d texels of %.3f h, squares off by at most %.4f\n", tiles_m[t],
-				      bases_m[b], planes.side, texel, worst);
-			assert_true(worst <= (fine ? 0.02 : 0.12));
-			planes_free(&planes);
+			print_message("tile %6.0f m, base %5.0f m: texels of %.3f h, squares off by at most %.4f\n", tiles_m[t], bases_m[b],
+				      texel, worst);
+			assert_true(worst <= (texel <= 1 / 3.0 ? 0.02 : 0.12));
 		}
 }
 
@@ -305,7 +274,8 @@ static void drift_moves_the_base(void **state)
 				const double at_x = up ? side + 0.4 - x : x, at_y = up ? side + 0.2 - y : y;
 				const double found =
 					read_at(&planes, 2, fmod(at_x + u + 2 * side, side), fmod(at_y + u / 2 + 2 * side, side));
-				worst = fmax(worst, fabs(found / 3 - periodic_square(5 * texel, u * texel, u / 2 * texel, side * texel)));
+				worst = fmax(worst,
+					     fabs(found / 3 - square_factor_periodic(5 * texel, u * texel, u / 2 * texel, side * texel)));
 			}
 		}
 		assert_true(worst < 0.012);

@@ -1,8 +1,9 @@
 /* The radiosity's switch and its settings in whole pictures. */
 #include "tests/unit/test_renderer_common.h"
 
-static const enum layer untouched[] = {LAYER_SUN_DIRECT, LAYER_ORDER0, LAYER_ORDER1,        LAYER_ORDER2,           LAYER_MULTIPLE,
-				       LAYER_CLOUD_SKY,  LAYER_SKY,    LAYER_TRANSMITTANCE, LAYER_OPTICAL_THICKNESS, LAYER_DISTANCE};
+static const enum layer untouched[] = {LAYER_SUN_DIRECT,        LAYER_ORDER0,    LAYER_ORDER1, LAYER_ORDER2,
+				       LAYER_MULTIPLE,          LAYER_CLOUD_SKY, LAYER_SKY,    LAYER_TRANSMITTANCE,
+				       LAYER_OPTICAL_THICKNESS, LAYER_DISTANCE};
 
 static struct scene over_ice(double height)
 {
@@ -35,8 +36,8 @@ static void switched_off_takes_the_exchange_alone(void **state)
 		struct frame off = render(&scene);
 		for (size_t i = 0; i < sizeof untouched / sizeof *untouched; i++)
 			for (int k = 0; k < 64 * 48; k++)
-				assert_memory_equal(pixel_of(&on, untouched[i], k % 64, k / 64), pixel_of(&off, untouched[i], k % 64, k / 64),
-						    3 * sizeof(float));
+				assert_memory_equal(pixel_of(&on, untouched[i], k % 64, k / 64),
+						    pixel_of(&off, untouched[i], k % 64, k / 64), 3 * sizeof(float));
 		print_message("from %4.0f m: base by the ground's light %.4f, without %.4f; ground %.4f, without %.4f\n", height,
 			      mean_luminance(&on, LAYER_CLOUD_GROUND), mean_luminance(&off, LAYER_CLOUD_GROUND),
 			      mean_luminance(&on, LAYER_GROUND), mean_luminance(&off, LAYER_GROUND));
@@ -109,7 +110,8 @@ static void ground_colours_the_base(void **state)
 	double country[3] = {0}, snow[3] = {0};
 	ground_colour(GROUND_COUNTRY, country);
 	ground_colour(GROUND_SNOW, snow);
-	print_message("the ground's light on the base, blue over green: country %.2f, snow %.2f\n", country[2] / country[1], snow[2] / snow[1]);
+	print_message("the ground's light on the base, blue over green: country %.2f, snow %.2f\n", country[2] / country[1],
+		      snow[2] / snow[1]);
 	assert_true(country[2] / country[1] < 0.6 * snow[2] / snow[1]);
 	assert_true(snow[1] > 3 * country[1]);
 }

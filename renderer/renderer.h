@@ -63,9 +63,10 @@ struct frame {
 	double radiosity_residual; /* light on its way when the exchange stopped, over what the ground receives; 0 when not run */
 	double radiosity_residuals[RADIOSITY_PASSES_LISTED]; /* the same after each of the first passes */
 	double exposure_ev;                                  /* what multiplied the picture: 2^exposure_ev, also when automatic */
-	double global_illuminance_lux;                       /* horizontal, at the camera: direct + diffuse */
-	double direct_illuminance_lux;                       /* horizontal, at the camera; mean over the cloud tile below the clouds */
-	double diffuse_illuminance_lux;                      /* horizontal, at the camera */
+	/* On a horizontal plane at the camera, integrated over the hemisphere above it; EXR only, 0 otherwise. */
+	double global_illuminance_lux; /* direct + diffuse */
+	double direct_illuminance_lux; /* by the beam, through the cloud before it */
+	double diffuse_illuminance_lux;
 };
 
 struct renderer;

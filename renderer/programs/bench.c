@@ -120,11 +120,13 @@ static void print_timing(const char *name, const struct frame *frame, double wal
 	printf("%-16s", name);
 	for (int i = 0; i < STAGE_COUNT; i++)
 		printf(" %s %.2f%s", stage_names[i], frame->timing[i].milliseconds, frame->timing[i].reused ? "*" : "");
-	printf(" wall %.2f ms, processor %.2f ms (%.0f lux, EV %.2f; residual after each of %d passes:", wall, processor,
-	       frame->global_illuminance_lux, frame->exposure_ev, frame->radiosity_passes);
+	printf(" wall %.2f ms, processor %.2f ms (EV %.2f", wall, processor, frame->exposure_ev);
+	if (frame->type == PIXEL_F32)
+		printf(", %.0f + %.0f lux", frame->direct_illuminance_lux, frame->diffuse_illuminance_lux);
+	printf("; residual after each of %d passes:", frame->radiosity_passes);
 	for (int i = 0; i < frame->radiosity_passes && i < RADIOSITY_PASSES_LISTED; i++)
 		printf(" %.1e", frame->radiosity_residuals[i]);
-	printf(")\n");
+	puts(")");
 }
 
 static bool render(struct renderer *renderer, const struct scene *scene, const char *name, const char *path)

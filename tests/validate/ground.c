@@ -24,7 +24,8 @@ static void compare_squares(struct validation *validation)
 				largest = fmax(largest, error);
 		}
 	fprintf(validation->page,
-		"- Squares: half-widths of h/2 to 16 h, seen in front of centre, edge and corner and outside, tiles of 2 to 200 km, bases at "
+		"- Squares: half-widths of h/2 to 16 h, seen in front of centre, edge and corner and outside, tiles of 2 to 200 km, bases "
+		"at "
 		"100 to 12000 m,\n"
 		"  where the planes' texels are a third of h or finer: tiles up to 85 times the base's height. Beyond, squares of whole "
 		"texels are exact in\n"
@@ -175,15 +176,16 @@ void figure_passes(struct validation *validation)
 	struct deck *deck = deck_create(validation->kernel, false);
 	struct deck_radiosity light[CURVES];
 	require(deck, "no OpenGL context");
-	fprintf(validation->page, "\n## Passes of the exchange between ground and clouds\n\n"
-				  "![Residual after each pass](passes.svg)\n\n"
-				  "Light still on its way from base to ground after each pass, root mean square over the tile, over the "
-				  "mean of all that the ground\n"
-				  "receives, in the worst band. Bold: where the default tolerance of 1e-3 stops. A pass is one bounce up and "
-				  "one down; by conjugate\n"
-				  "gradients each takes off a factor of 3 to 100, where the plain series leaves the product of both "
-				  "albedos, 0.7 to 0.8 over snow.\n\n"
-				  "| scene | 1 |");
+	fprintf(validation->page,
+		"\n## Passes of the exchange between ground and clouds\n\n"
+		"![Residual after each pass](passes.svg)\n\n"
+		"Light still on its way from base to ground after each pass, root mean square over the tile, over the "
+		"mean of all that the ground\n"
+		"receives, in the worst band. Bold: where the default tolerance of 1e-3 stops. A pass is one bounce up and "
+		"one down; by conjugate\n"
+		"gradients each takes off a factor of 3 to 100, where the plain series leaves the product of both "
+		"albedos, 0.7 to 0.8 over snow.\n\n"
+		"| scene | 1 |");
 	for (int pass = 1; pass < SHOWN; pass++)
 		fprintf(validation->page, " %d |", pass + 1);
 	fprintf(validation->page, "\n| --- |");

@@ -10,10 +10,10 @@ double square_factor(double a, double x, double y);
 double square_factor_periodic(double a, double x, double y, double tile);
 
 /* Largest difference, over the emitter's value, between the light that a plane has at a distance and the form factor: in front of the
- * square's centre, edge and corner, and outside across an edge, over a corner and far off. Half-width over the distance; where the tile is too
- * small for it, a smaller one of at most 0.4 tiles. Received light is read as the view does, between texels' centres. texel: their size over
- * the distance; where it is above 1/3, which the finest planes of large tiles have, the square is of an even number of whole texels. Negative
- * when out of memory. */
+ * square's centre, edge and corner, and outside across an edge, over a corner and far off. Half-width over the distance; where the tile is
+ * too small for it, a smaller one of at most 0.4 tiles. Received light is read as the view does, between texels' centres. texel: their size
+ * over the distance; where it is above 1/3, which the finest planes of large tiles have, the square is of an even number of whole texels.
+ * Negative when out of memory. */
 double square_error(double tile_m, double distance_m, double half_width, double *texel);
 
 #endif

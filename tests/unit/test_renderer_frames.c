@@ -128,7 +128,7 @@ static void paths_are_layers(void **state)
 				for (int c = 0; c < 3; c++) {
 					const double all = pixel_of(&whole, LAYER_COLOR, x, y)[c];
 					const double part = pixel_of(&whole, (enum layer)layer, x, y)[c];
-					assert_float_equal(pixel_of(&alone, LAYER_COLOR, x, y)[c], part, 1e-5 * fabs(part) + 1e-7);
+					assert_float_equal(pixel_of(&alone, LAYER_COLOR, x, y)[c], part, 1e-4 * fabs(part) + 1e-6);
 					assert_float_equal(pixel_of(&without, LAYER_COLOR, x, y)[c], all - part,
 							   1e-5 * (fabs(all) + fabs(part)));
 					assert_true(pixel_of(&without, (enum layer)layer, x, y)[c] == 0);

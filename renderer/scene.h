@@ -112,7 +112,7 @@ struct scene_camera {
 
 struct scene_radiosity {
 	bool enabled;
-	double tolerance; /* relative energy left after the last pass; 1e-6..1 */
+	double tolerance; /* residual to stop at (renderer/stages/radiosity_solve.h); 1e-6..1 */
 	int max_passes;   /* 0..1024 */
 };
 

@@ -269,6 +269,8 @@ static picture render_cpu(int variant, const made &out)
 	glsl::set_scene_block(shared.context.block);
 	for (int i = 0; i < LAYERS; i++) {
 		glsl::arguments[0].x = (float)layers[i];
+		for (int k = 1; k < 4; k++)
+			glsl::arguments[k] = glsl::vec4(1.0f); /* all paths */
 		for (int y = 0; y < HEIGHT; y++)
 			for (int x = 0; x < WIDTH; x++) {
 				cpu_pass[variant](glsl::ivec2(x, y));

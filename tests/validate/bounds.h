@@ -35,7 +35,8 @@ enum tally_id {
 	TALLY_DECK_BASE,
 	TALLY_DECK_REFERENCE,
 	TALLY_DECK_BALANCE,
-	TALLY_COLD, /* ms: least of several, of one distribution */
+	TALLY_WATER_SKY, /* relative */
+	TALLY_COLD,      /* ms: least of several, of one distribution */
 	TALLY_DISK,
 	TALLY_MEMORY,
 	TALLY_COUNT
@@ -66,7 +67,7 @@ struct bound {
 	const char *unit; /* "%" shows it times 100 */
 };
 
-enum { BOUND_COUNT = 30 };
+enum { BOUND_COUNT = 31 };
 extern const struct bound bounds[BOUND_COUNT];
 
 enum verdict { VERDICT_REACHED, VERDICT_TOLERATED, VERDICT_BROKEN };

@@ -64,7 +64,9 @@ void figure_phase(struct validation *validation);
 void figure_orders(struct validation *validation);
 void figure_fluxes(struct validation *validation);
 void figure_radiance(struct validation *validation);
-void figure_passes(struct validation *validation); /* none of the paper's */
+/* None of the paper's. */
+void figure_passes(struct validation *validation);
+void figure_water_sky(struct validation *validation);
 
 /* Opens a data file. */
 FILE *figure_file(const struct validation *validation, const char *name);

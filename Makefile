@@ -1,7 +1,7 @@
 # make run    installs what is missing, builds, starts the daemon
 # make test   installs what tests need, builds, runs all tests
 # make demo   four pictures into out/, with their timings
-# make validate   measures the bounds of the optics and draws the paper's figures into docs/validation/, some minutes
+# make validate   measures the bounds of optics and radiosity and draws the paper's figures into docs/validation/, some minutes
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
 
 SHELL := /bin/bash

@@ -126,6 +126,7 @@ $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(RENDERER_LIBS)
 $(B)/tests/test_validate_bounds: $(call obj,tests/validate/bounds.c)
+$(B)/tests/test_sky_light: $(call obj,tests/validate/air_photons.c)
 
 -include $(shell find $(B) -name '*.d' 2>/dev/null)
 

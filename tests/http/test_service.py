@@ -229,7 +229,7 @@ def test_later_members_say_so(daemon, section, member, values):
         assert any(e["pointer"] == f"/{section}/{member}" and "not available yet" in e["detail"] for e in answer.json["errors"])
 
 
-@pytest.mark.parametrize("path", ["/v1/sky", "/v1/assets", "/v1/assets/name"])
+@pytest.mark.parametrize("path", ["/v1/assets", "/v1/assets/name"])
 def test_later_calls_say_so(daemon, path):
     answer = daemon.get(path)
     assert_problem(answer, 404, "not-found")

@@ -33,6 +33,12 @@ enum tally_id {
 	TALLY_COLD,         /* ms: least of several, of one distribution */
 	TALLY_DISK,
 	TALLY_MEMORY,
+	TALLY_SKY_ABSOLUTE, /* clear sky, relative: against discrete ordinates; of photons what their error does not explain */
+	TALLY_SKY_RELATIVE,
+	TALLY_SKY_PHOTONS,
+	TALLY_SKY_PHOTONS_RELATIVE,
+	TALLY_SKY_COLOUR, /* distance of chromaticities x, y */
+	TALLY_SKY_LUMINANCE,
 	TALLY_COUNT
 };
 
@@ -61,7 +67,7 @@ struct bound {
 	const char *unit; /* "%" shows it times 100 */
 };
 
-enum { BOUND_COUNT = 25 };
+enum { BOUND_COUNT = 31 };
 extern const struct bound bounds[BOUND_COUNT];
 
 enum verdict { VERDICT_REACHED, VERDICT_TOLERATED, VERDICT_BROKEN };

@@ -91,8 +91,9 @@ static const struct part {
 	{"times", validate_times},     {"reference", validate_reference},
 	{"spheres", validate_spheres}, {"conservation", validate_conservation},
 	{"lookup", validate_lookup},   {"photons", validate_photons},
-	{"figure 4", figure_phase},    {"figure 6", figure_orders},
-	{"figure 8", figure_fluxes},   {"figure 9", figure_radiance},
+	{"sky", validate_sky},         {"figure 4", figure_phase},
+	{"figure 6", figure_orders},   {"figure 8", figure_fluxes},
+	{"figure 9", figure_radiance},
 };
 
 static double now_s(void)

@@ -56,6 +56,7 @@ void validate_spheres(struct validation *validation);      /* sums over single s
 void validate_conservation(struct validation *validation); /* R + T = 1, reciprocity */
 void validate_lookup(struct validation *validation);       /* the shader */
 void validate_photons(struct validation *validation);      /* Monte Carlo */
+void validate_sky(struct validation *validation);          /* the clear sky; writes the page sky.md */
 void validate_times(struct validation *validation);        /* the store */
 
 /* The paper's figures: data files in the folder, text onto the page. */

@@ -59,7 +59,8 @@ static void compare_reference(const struct sky_check *check)
 		struct sky_light light = light_of(check, &scene);
 		for (int band = 0; band < 3; band++) {
 			const json_t *table = json_object_get(json_object_get(file, "rayleigh_only_black_ground"), band_names[band]);
-			const json_t *rows = json_object_get(json_object_get(json_object_get(table, "by_sun_zenith"), zeniths[i]), "radiance");
+			const json_t *rows =
+				json_object_get(json_object_get(json_object_get(table, "by_sun_zenith"), zeniths[i]), "radiance");
 			double zenith = 1;
 			for (int view = 0; view < VIEWS; view++)
 				for (int azimuth = 0; azimuth < AZIMUTHS; azimuth++) {
@@ -68,8 +69,9 @@ static void compare_reference(const struct sky_check *check)
 					const double ratio = radiance_of(&light, band, view, azimuth) / wanted;
 					if (view == 0)
 						zenith = ratio;
-					tally_add(&tally[TALLY_SKY_ABSOLUTE], fabs(ratio - 1), "%s nm, sun at %s, view at %g deg, azimuth %g",
-						  band_names[band], zeniths[i], views[view], azimuths[azimuth]);
+					tally_add(&tally[TALLY_SKY_ABSOLUTE], fabs(ratio - 1),
+						  "%s nm, sun at %s, view at %g deg, azimuth %g", band_names[band], zeniths[i], views[view],
+						  azimuths[azimuth]);
 					tally_add(&tally[TALLY_SKY_RELATIVE], fabs(ratio / zenith - 1),
 						  "%s nm, sun at %s, view at %g deg, azimuth %g", band_names[band], zeniths[i], views[view],
 						  azimuths[azimuth]);
@@ -80,7 +82,8 @@ static void compare_reference(const struct sky_check *check)
 	json_decref(file);
 }
 
-/* --- photons --------------------------------------------------------------------------------------------------------------------------- */
+/* --- photons ---------------------------------------------------------------------------------------------------------------------------
+ */
 
 /* Bodhaine et al. 1999 in its form in wavelength, to the optical thicknesses that tests/data/sky.json has. */
 static double rayleigh_thickness(double nm)
@@ -116,18 +119,19 @@ static void compare_photons(const struct sky_check *check, double sun_zenith, do
 				const double d[3] = {sin(z) * cos(a), sin(z) * sin(a), cos(z)};
 				const struct air_radiance wanted =
 					air_photons_radiance(&air, 0, d, sun_zenith * DEGREE, view ? photons : 8 * photons, &state);
-				const double ratio = radiance_of(&light, band, view, azimuth) / wanted.mean, error = wanted.error / wanted.mean;
+				const double ratio = radiance_of(&light, band, view, azimuth) / wanted.mean,
+					     error = wanted.error / wanted.mean;
 				if (view == 0)
 					zenith = ratio, zenith_error = error;
 				squares += (ratio - 1) * (ratio - 1) / (AZIMUTHS * (VIEWS - 1) + 1);
 				worst = fmax(worst, fabs(ratio - 1));
 				tally_add(&tally[TALLY_SKY_PHOTONS], fmax(0, fabs(ratio - 1) - 3 * error),
-					  "%s nm, aerosol %g, albedo %g, sun at %g, view at %g deg, azimuth %g", band_names[band], aerosol, albedo,
-					  sun_zenith, views[view], azimuths[azimuth]);
+					  "%s nm, aerosol %g, albedo %g, sun at %g, view at %g deg, azimuth %g", band_names[band], aerosol,
+					  albedo, sun_zenith, views[view], azimuths[azimuth]);
 				tally_add(&tally[TALLY_SKY_PHOTONS_RELATIVE],
 					  fmax(0, fabs(ratio / zenith - 1) - 3 * hypot(error, zenith_error)),
-					  "%s nm, aerosol %g, albedo %g, sun at %g, view at %g deg, azimuth %g", band_names[band], aerosol, albedo,
-					  sun_zenith, views[view], azimuths[azimuth]);
+					  "%s nm, aerosol %g, albedo %g, sun at %g, view at %g deg, azimuth %g", band_names[band], aerosol,
+					  albedo, sun_zenith, views[view], azimuths[azimuth]);
 			}
 		fprintf(check->page, " %.1f, %.1f |", 100 * sqrt(squares), 100 * worst);
 	}
@@ -137,22 +141,25 @@ static void compare_photons(const struct sky_check *check, double sun_zenith, do
 
 static void compare_all_photons(const struct sky_check *check)
 {
-	static const double cases[][3] = {{30, 0.065, 0.1}, {60, 0.065, 0.1}, {75, 0.065, 0.1}, {0.5, 0.2, 0.1}, {60, 0.2, 0.8},
-					  {75, 0.3, 0.5},   {30, 0.5, 0.2},   {60, 0.5, 0},     {75, 0.5, 0.8},  {88, 0.1, 0.1},
-					  {90, 0.1, 0.1}};
+	static const double cases[][3] = {{30, 0.065, 0.1}, {60, 0.065, 0.1}, {75, 0.065, 0.1}, {0.5, 0.2, 0.1},
+					  {60, 0.2, 0.8},   {75, 0.3, 0.5},   {30, 0.5, 0.2},   {60, 0.5, 0},
+					  {75, 0.5, 0.8},   {88, 0.1, 0.1},   {90, 0.1, 0.1}};
 	fputs("## Haze, bright ground, low sun\n\n"
-	      "Radiance at the ground against photons traced backwards over a spherical Earth (`tests/validate/air_photons.c`), aerosol optical depth at\n"
-	      "550 nm, no ozone, views to 75 degrees. Percent: rms and worst of 26 directions, the photons' own error of 1 to 3 % included.\n\n"
+	      "Radiance at the ground against photons traced backwards over a spherical Earth (`tests/validate/air_photons.c`), aerosol "
+	      "optical depth at\n"
+	      "550 nm, no ozone, views to 75 degrees. Percent: rms and worst of 26 directions, the photons' own error of 1 to 3 % "
+	      "included.\n\n"
 	      "| sun zenith | aerosol | albedo | 650 nm | 550 nm | 450 nm |\n| --- | --- | --- | --- | --- | --- |\n",
 	      check->page);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		compare_photons(check, cases[i][0], cases[i][1], cases[i][2]);
 }
 
-/* --- colour ---------------------------------------------------------------------------------------------------------------------------- */
+/* --- colour ----------------------------------------------------------------------------------------------------------------------------
+ */
 
-/* Means over 10 nm from 360 nm on: solar irradiance outside the atmosphere (ASTM G173-03), W/m2/nm; cross section of ozone (Serdyuchenko et al.
- * 2014, 233 K), m2. */
+/* Means over 10 nm from 360 nm on: solar irradiance outside the atmosphere (ASTM G173-03), W/m2/nm; cross section of ozone (Serdyuchenko et
+ * al. 2014, 233 K), m2. */
 enum { FIRST_NM = 360, STEP_NM = 10, STEPS = 44 };
 static const double solar[STEPS] = {1.11776, 1.14259, 1.01249, 1.14716, 1.72765, 1.73054, 1.6887,  1.61253, 1.91198, 2.03474, 2.02042,
 				    2.02212, 1.93377, 1.95809, 1.91686, 1.8298,  1.8685,  1.8931,  1.85149, 1.8504,  1.8341,  1.8345,
@@ -210,8 +217,8 @@ static void bands_xyz(const double bands[3], double xyz[3])
 }
 
 /* With the same photons in three bands, so that only the bands differ: ozone as given. */
-static void three_band_xyz(const struct sky_check *check, const struct scene *scene, const struct sight *sight, const double cross_section[3],
-			   double xyz[3])
+static void three_band_xyz(const struct sky_check *check, const struct scene *scene, const struct sight *sight,
+			   const double cross_section[3], double xyz[3])
 {
 	double bands[3];
 	for (int band = 0; band < 3; band++) {
@@ -242,29 +249,37 @@ static void compare_sight(const struct sky_check *check, const struct sight *sig
 	for (int i = 0; i < 3; i++)
 		fprintf(check->page, " %.3f %.3f, %.3g |", xy[i][0], xy[i][1], xyz[i][1]);
 	fputc('\n', check->page);
-	tally_add(&tally[TALLY_SKY_COLOUR], hypot(xy[1][0] - xy[0][0], xy[1][1] - xy[0][1]), "sun at %g deg, %s", 90 - sight->sun_zenith, where);
+	tally_add(&tally[TALLY_SKY_COLOUR], hypot(xy[1][0] - xy[0][0], xy[1][1] - xy[0][1]), "sun at %g deg, %s", 90 - sight->sun_zenith,
+		  where);
 	tally_add(&tally[TALLY_SKY_LUMINANCE], fabs(xyz[1][1] / xyz[0][1] - 1), "sun at %g deg, %s", 90 - sight->sun_zenith, where);
 }
 
 static void compare_colours(const struct sky_check *check)
 {
-	static const struct sight sights[] = {{30, -1, 0}, {70, -1, 0}, {80, -1, 0},  {85, -1, 0},  {88, -1, 0},  {30, 45, 180},
-					      {60, 0, 0},  {60, 45, 180}, {80, 0, 0},  {85, 70, 0},  {88, 0, 0},   {90, 0, 0},
-					      {90, 70, 0}, {92, 0, 0},  {94, 0, 0},   {94, 75, 0},  {95, 0, 0},   {96, 75, 0}};
+	static const struct sight sights[] = {{30, -1, 0}, {70, -1, 0},   {80, -1, 0}, {85, -1, 0}, {88, -1, 0}, {30, 45, 180},
+					      {60, 0, 0},  {60, 45, 180}, {80, 0, 0},  {85, 70, 0}, {88, 0, 0},  {90, 0, 0},
+					      {90, 70, 0}, {92, 0, 0},    {94, 0, 0},  {94, 75, 0}, {95, 0, 0},  {96, 75, 0}};
 	fputs("\n## Colour: three bands for a spectrum\n\n"
-	      "Chromaticity x, y (CIE 1931) and luminance in cd/m2 (illuminance in lux for the sun), aerosol 0.1, ozone 300 DU, ground of albedo 0.1:\n"
-	      "by a spectrum in steps of 10 nm (solar spectrum ASTM G173, ozone Serdyuchenko et al. 2014, Rayleigh Bodhaine et al. 1999), by the three\n"
-	      "bands with the ozone of pictures, and with that of the bands' own wavelengths. All by the same photons, so that the bands alone differ.\n\n"
-	      "Chappuis' band of ozone peaks at 600 nm, between the bands: cross sections of 2.4, 3.3, 0.17e-25 m2 at 650, 550, 450 nm leave\n"
-	      "a low sun too red and twilight violet. Those that come nearest to the spectrum over this table are 4.4, 3.3 and 0.35e-25 m2, and pictures take them;\n"
-	      "`/v1/sky`, which speaks of wavelengths, keeps the others. Rayleigh scattering and aerosol are those of the wavelengths in both.\n\n"
+	      "Chromaticity x, y (CIE 1931) and luminance in cd/m2 (illuminance in lux for the sun), aerosol 0.1, ozone 300 DU, ground of "
+	      "albedo 0.1:\n"
+	      "by a spectrum in steps of 10 nm (solar spectrum ASTM G173, ozone Serdyuchenko et al. 2014, Rayleigh Bodhaine et al. 1999), "
+	      "by the three\n"
+	      "bands with the ozone of pictures, and with that of the bands' own wavelengths. All by the same photons, so that the bands "
+	      "alone differ.\n\n"
+	      "Chappuis' band of ozone peaks at 600 nm, between the bands: cross sections of 2.4, 3.3, 0.17e-25 m2 at 650, 550, 450 nm "
+	      "leave\n"
+	      "a low sun too red and twilight violet. Those that come nearest to the spectrum over this table are 4.4, 3.3 and 0.35e-25 "
+	      "m2, and pictures take them;\n"
+	      "`/v1/sky`, which speaks of wavelengths, keeps the others. Rayleigh scattering and aerosol are those of the wavelengths in "
+	      "both.\n\n"
 	      "| sun's elevation | direction | spectrum | pictures | ozone of the wavelengths |\n| --- | --- | --- | --- | --- |\n",
 	      check->page);
 	for (size_t i = 0; i < sizeof sights / sizeof *sights; i++)
 		compare_sight(check, &sights[i]);
 }
 
-/* --- models of others ------------------------------------------------------------------------------------------------------------------- */
+/* --- models of others -------------------------------------------------------------------------------------------------------------------
+ */
 
 /* CIE S 011 / ISO 15469 type 12, clear sky of low turbidity: luminance over the zenith's. */
 static double cie_clear(double sun_zenith, double view_zenith, double angle)
@@ -319,20 +334,26 @@ static void compare_models_at(const struct sky_check *check, double sun_zenith)
 static void compare_models(const struct sky_check *check)
 {
 	fputs("\n## Beside the models of others\n\n"
-	      "Luminance over the zenith's: here (aerosol 0.1, ozone 300 DU, albedo 0.1), CIE standard sky type 12 (ISO 15469), Preetham et al. 1999 at\n"
+	      "Luminance over the zenith's: here (aerosol 0.1, ozone 300 DU, albedo 0.1), CIE standard sky type 12 (ISO 15469), Preetham "
+	      "et al. 1999 at\n"
 	      "turbidity 2.2. Directions by zenith angle and azimuth from the sun. Zenith luminance in cd/m2: here, Preetham.\n\n"
-	      "| sun zenith | at the zenith | 30, 90 | 60, 90 | 75, 90 | 60, 180 | 75, 180 | 75, 0 |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
+	      "| sun zenith | at the zenith | 30, 90 | 60, 90 | 75, 90 | 60, 180 | 75, 180 | 75, 0 |\n| --- | --- | --- | --- | --- | --- "
+	      "| --- | --- |\n",
 	      check->page);
 	for (int zenith = 20; zenith <= 80; zenith += 15)
 		compare_models_at(check, zenith);
-	fputs("\nThe models are fits: CIE's type 12 to measured skies of low turbidity, Preetham's to a simulation. They differ from each other by tens of\n"
-	      "percent, Preetham's zenith luminance most, which published comparisons find too high as well (Kider et al. 2014; Bruneton 2016). Hosek\n"
-	      "and Wilkie 2012 needs its data set of coefficients, which is not part of this project, so its values are not computed here; Bruneton 2016 (figures 5\n"
-	      "to 8) has it beside libRadtran and measurements for the aerosol and ground that this sky takes too: in absolute luminance it lies well below Preetham's.\n",
+	fputs("\nBoth are fits, CIE's type 12 to measured clear skies, Preetham's to a simulation, and differ from each other by tens of "
+	      "percent. This sky\n"
+	      "lies nearer to CIE's away from the sun and has more light near the horizon and in the aureole, which is that of the aerosol "
+	      "it takes. Preetham's zenith\n"
+	      "is far brighter, which comparisons with measured skies found to be too bright (Kider et al. 2014; Bruneton 2016). The model "
+	      "of\n"
+	      "Hosek and Wilkie 2012 needs its published data set of coefficients, which this project does not hold: it is missing here.\n",
 	      check->page);
 }
 
-/* --- all ---------------------------------------------------------------------------------------------------------------------------------- */
+/* --- all
+ * ---------------------------------------------------------------------------------------------------------------------------------- */
 
 static FILE *open_page(const struct validation *validation)
 {
@@ -342,10 +363,14 @@ static FILE *open_page(const struct validation *validation)
 	require(page, "cannot write the sky's page");
 	fputs("# The clear sky\n\n"
 	      "Written by `make validate`; its bounds stand in the table of [README.md](README.md).\n\n"
-	      "The sky is computed per band over a spherical Earth (`shaders/lib/scattering.glsl`): the beam scattered once by the whole phase\n"
-	      "function, its forward peak spread by the small-angle sum over events; all orders after that from tables of the diffuse light by spherical harmonics\n"
-	      "to the third degree (`shaders/lib/multiscatter.glsl`), iterated from Hillaire's closed series. What air consists of: Rayleigh\n"
-	      "(density of the US Standard Atmosphere by two exponentials), aerosol (1.2 km, Angstrom exponent 0.8, single scattering albedo 0.8,\n"
+	      "The sky is computed per band over a spherical Earth (`shaders/lib/scattering.glsl`): the beam scattered once by the whole "
+	      "phase\n"
+	      "function, its forward peak spread by the small-angle sum over events; all orders after that from tables of the diffuse "
+	      "light by spherical harmonics\n"
+	      "to the third degree (`shaders/lib/multiscatter.glsl`), iterated from Hillaire's closed series. What air consists of: "
+	      "Rayleigh\n"
+	      "(density of the US Standard Atmosphere by two exponentials), aerosol (1.2 km, Angstrom exponent 0.8, single scattering "
+	      "albedo 0.8,\n"
 	      "Cornette-Shanks 0.7), ozone (tent from 10 to 40 km).\n\n",
 	      page);
 	return page;

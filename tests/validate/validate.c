@@ -123,6 +123,7 @@ static void print_head(FILE *file, const struct validation *validation)
 		      "times is the same in every run on one kind of processor.\n\n");
 	if (validation->effort != 1)
 		fprintf(file, "**A run of effort %g: too short for the bounds.**\n\n", validation->effort);
+	fprintf(file, "The clear sky has a page of its own, [sky.md](sky.md).\n\n");
 	fprintf(file, "## Bounds\n\n");
 	bounds_print(file, &validation->measured);
 	fprintf(file, "\nHow:\n\n"

@@ -49,8 +49,8 @@ static const double aerosol_exponent = 0.8, aerosol_scale_m = 1200, aerosol_albe
 /* Ozone absorption cross sections in m2 (Serdyuchenko et al. 2014, 223 K, means over 10 nm). The bands' own wavelengths miss the peak of
  * Chappuis' band at 600 nm, of which the red third of the spectrum has most: pictures take what gives sun, sky and twilight the colour and
  * luminance that a spectrum of 10 nm steps gives them (docs/validation/sky.md), numbers at 650, 550 and 450 nm what holds there. */
-static const double ozone_of_pictures[3] = {4.4e-25, 3.3e-25, 3.5e-26};
-static const double ozone_at_wavelength[3] = {2.4e-25, 3.3e-25, 1.7e-26};
+const double sky_ozone_of_pictures[3] = {4.4e-25, 3.3e-25, 3.5e-26};
+const double sky_ozone_at_wavelength[3] = {2.4e-25, 3.3e-25, 1.7e-26};
 /* 1 DU is 2.6867e20 molecules per m2; tent from 10 to 40 km, whose integral is its half-width of 15 km. */
 static const double ozone_peak_m = 25000, ozone_half_width_m = 15000, dobson_per_m2 = 2.6867e20;
 
@@ -323,7 +323,7 @@ static const struct sky_view *sky_view_get(const struct sky_stage *stage, struct
 bool sky_stage_run(const struct sky_stage *stage, struct stage_context *context, const struct scene *scene, const double mean_albedo[3],
 		   struct sky_tables *tables)
 {
-	fill_block(&context->block, scene, mean_albedo, ozone_of_pictures);
+	fill_block(&context->block, scene, mean_albedo, sky_ozone_of_pictures);
 	stage_upload_block(context);
 	const struct air_tables *air = air_tables_get(stage, context, scene, mean_albedo);
 	const struct sky_view *view = air ? sky_view_get(stage, context, scene, mean_albedo, air) : NULL;
@@ -402,7 +402,7 @@ bool sky_stage_run_directions(const struct sky_stage *stage, struct stage_contex
 			      const double mean_albedo[3], const struct sky_directions *directions, struct sky_light *light)
 {
 	double sun[3];
-	fill_block(&context->block, scene, mean_albedo, ozone_at_wavelength);
+	fill_block(&context->block, scene, mean_albedo, sky_ozone_at_wavelength);
 	stage_upload_block(context);
 	light->radiance = malloc((size_t)directions->view_count * (size_t)directions->azimuth_count * 3 * sizeof *light->radiance);
 	const struct air_tables *air = light->radiance ? air_tables_get(stage, context, scene, mean_albedo) : NULL;

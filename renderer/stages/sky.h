@@ -22,6 +22,9 @@ struct sky_tables {
 	double sun_cloud[3], sun_ground[3];                     /* by the sun on a plane normal to its beam */
 };
 
+/* Absorption cross sections of ozone in m2 per band: those that stand for the spectrum in pictures, and those at the bands' wavelengths. */
+extern const double sky_ozone_of_pictures[3], sky_ozone_at_wavelength[3];
+
 bool sky_stage_init(struct sky_stage *stage, const struct pass_compiler *compiler);
 void sky_stage_finish(struct sky_stage *stage);
 

@@ -3,6 +3,7 @@
 
 #include "renderer/renderer.h"
 #include "renderer/stages/colour.h"
+#include "renderer/stages/sky.h"
 #include "tests/validate/air_photons.h"
 
 #include <jansson.h>
@@ -230,13 +231,12 @@ static void three_band_xyz(const struct sky_check *check, const struct scene *sc
 
 static void compare_sight(const struct sky_check *check, const struct sight *sight)
 {
-	static const double at_wavelength[3] = {2.4e-25, 3.3e-25, 1.7e-26}, of_pictures[3] = {4.4e-25, 3.3e-25, 3.5e-26};
 	struct tally *tally = check->validation->measured.tally;
 	const struct scene scene = scene_of(sight->sun_zenith, 0.1, 300, 0.1);
 	double xyz[3][3], xy[3][2];
 	spectral_xyz(check, &scene, sight, xyz[0]);
-	three_band_xyz(check, &scene, sight, of_pictures, xyz[1]);
-	three_band_xyz(check, &scene, sight, at_wavelength, xyz[2]);
+	three_band_xyz(check, &scene, sight, sky_ozone_of_pictures, xyz[1]);
+	three_band_xyz(check, &scene, sight, sky_ozone_at_wavelength, xyz[2]);
 	for (int i = 0; i < 3; i++)
 		for (int k = 0; k < 2; k++)
 			xy[i][k] = xyz[i][k] / (xyz[i][0] + xyz[i][1] + xyz[i][2]);

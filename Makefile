@@ -131,6 +131,7 @@ $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 $(B)/tests/test_validate_bounds: $(call obj,tests/validate/bounds.c)
 $(B)/tests/test_deck: $(call obj,tests/validate/deck.c)
 $(B)/tests/test_exchange: $(call obj,tests/validate/squares.c)
+$(B)/tests/test_sky_light: $(call obj,tests/validate/air_photons.c)
 
 -include $(shell find $(B) -name '*.d' 2>/dev/null)
 

@@ -432,6 +432,47 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	return result;
 }
 
+/* --- the sky alone ----------------------------------------------------------------------------------------------------------------- */
+
+static enum render_result run_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
+					struct sky_light *light)
+{
+	struct stage_context *context = &renderer->context;
+	struct ground_maps ground;
+	const bool ok = ground_stage_run(&renderer->ground, context, scene, &ground) &&
+			sky_stage_run_directions(&renderer->sky, context, scene, ground.mean, directions, light);
+	if (gl_failed("sky light") && !gl_failed_for_memory())
+		return RENDER_FAILED;
+	return ok ? RENDER_OK : gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+}
+
+enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
+				      renderer_cancelled *cancelled, void *context, struct sky_light *light)
+{
+	struct scene clear = *scene;
+	clear.clouds.type = CLOUD_NONE;
+	*light = (struct sky_light){0};
+	if (cancelled && cancelled(context))
+		return RENDER_CANCELLED;
+	cache_begin_frame(renderer->context.cache);
+	memset(&renderer->context.block, 0, sizeof renderer->context.block);
+	view_fill_block(&renderer->context.block, &clear);
+	renderer->context.reused = true;
+	gl_timer_begin(&renderer->timers[STAGE_SKY]);
+	enum render_result result = run_sky_light(renderer, &clear, directions, light);
+	gl_timer_end(&renderer->timers[STAGE_SKY]);
+	light->timing = (struct stage_timing){gl_timer_milliseconds(&renderer->timers[STAGE_SKY]), false};
+	if (result == RENDER_OK && cancelled && cancelled(context))
+		result = RENDER_CANCELLED;
+	if (result != RENDER_OK) {
+		if (result == RENDER_OUT_OF_MEMORY)
+			log_error("renderer: out of memory");
+		free(light->radiance);
+		*light = (struct sky_light){0};
+	}
+	return result;
+}
+
 void frame_finish(struct frame *frame)
 {
 	free(frame->pixels);

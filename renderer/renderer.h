@@ -87,6 +87,25 @@ enum render_result { RENDER_OK, RENDER_CANCELLED, RENDER_OUT_OF_MEMORY, RENDER_F
 enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
 				   struct frame *frame);
 
+/* Directions to look at the sky in: each zenith angle with each azimuth. */
+struct sky_directions {
+	int view_count, azimuth_count; /* from 1 */
+	const double *view_zenith_deg; /* 0..90 */
+	const double *azimuth_deg;     /* of the viewing direction, clockwise from north */
+};
+
+/* What a clear sky sends to the ground, per band, over the solar irradiance outside the atmosphere on a plane normal to the beam. */
+struct sky_light {
+	double *radiance;               /* [band][view][azimuth], 1/sr; malloc'd, the sun's disc is not in it */
+	double direct_transmittance[3]; /* of the beam, on a plane normal to it; 0 when the sun has set */
+	double diffuse_irradiance[3];   /* horizontal */
+	struct stage_timing timing;     /* of the sky stage; never reused: directions are always computed */
+};
+
+/* The sky of a valid scene's sun, atmosphere and ground, without clouds. As renderer_render; on RENDER_OK the caller frees radiance. */
+enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
+				      renderer_cancelled *cancelled, void *context, struct sky_light *light);
+
 /* Frees the pixels. Takes a zeroed frame. */
 void frame_finish(struct frame *frame);
 

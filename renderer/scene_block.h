@@ -10,7 +10,7 @@ struct scene_block {
 	float sun_direction[4];       /* unit vector to the sun; angular radius in radians */
 	float sun_at_camera[4];       /* irradiance by the sun at the camera on a plane normal to the beam, W/m2/nm; - */
 	float solar_irradiance[4];    /* outside the atmosphere on a plane normal to the beam, W/m2/nm; - */
-	float rayleigh[4];            /* scattering coefficient at the ground, 1/m; scale height, m */
+	float rayleigh[4];            /* scattering coefficient at the ground, 1/m; scale height up to 10 km, m */
 	float aerosol[4];             /* extinction coefficient at the ground, 1/m; scale height, m */
 	float aerosol_shape[4];       /* single scattering albedo; asymmetry; -; - */
 	float ozone[4];               /* absorption coefficient at its peak, 1/m; height of the peak, m */

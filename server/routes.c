@@ -6,6 +6,7 @@ static const struct route routes[] = {
 	{"/v1/render", "GET, HEAD, POST", route_render, ROUTE_RENDER},
 	{"/v1/optics", "GET, HEAD", route_optics, ROUTE_OPTICS},
 	{"/v1/slab", "GET, HEAD", route_slab, ROUTE_SLAB},
+	{"/v1/sky", "GET, HEAD", route_sky, ROUTE_SKY},
 	{"/v1/sun", "GET, HEAD", route_sun, ROUTE_SUN},
 	{"/v1/presets", "GET, HEAD", route_presets, ROUTE_PRESETS},
 	{"/", "GET, HEAD", route_index, ROUTE_INDEX},
@@ -16,7 +17,7 @@ static const struct route routes[] = {
 };
 
 /* Known calls of later releases, with everything below them. */
-static const char *const later_paths[] = {"/v1/sky", "/v1/assets"};
+static const char *const later_paths[] = {"/v1/assets"};
 
 /* Without `allow`: every method is as wrong as the path. */
 static const struct route later = {"later", NULL, route_later, ROUTE_OTHER};

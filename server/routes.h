@@ -7,7 +7,7 @@
 /* The route of a path. Never NULL: unknown paths have one that answers 404. */
 const struct route *routes_find(const char *path);
 
-request_handler route_render, route_optics, route_slab, route_sun, route_presets, route_index, route_openapi, route_healthz, route_readyz,
-	route_metrics, route_later, route_unknown;
+request_handler route_render, route_optics, route_slab, route_sky, route_sun, route_presets, route_index, route_openapi, route_healthz,
+	route_readyz, route_metrics, route_later, route_unknown;
 
 #endif

@@ -35,6 +35,12 @@ const struct bound bounds[BOUND_COUNT] = {
 	{"new droplets, cold, two threads", TALLY_COLD, STATISTIC_WORST, 250, 2, "ms"},
 	{"the same droplets from disk", TALLY_DISK, STATISTIC_WORST, 10, 2, "ms"},
 	{"the same droplets from memory", TALLY_MEMORY, STATISTIC_WORST, 0.1, 2, "ms"},
+	{"clear sky against `sky.json`, to 75 degrees", TALLY_SKY_ABSOLUTE, STATISTIC_WORST, 0.15, 1, "%"},
+	{"the same over the zenith's", TALLY_SKY_RELATIVE, STATISTIC_WORST, 0.10, 1, "%"},
+	{"hazy skies against photons, beyond 3 standard errors", TALLY_SKY_PHOTONS, STATISTIC_WORST, 0.15, 1, "%"},
+	{"the same over the zenith's", TALLY_SKY_PHOTONS_RELATIVE, STATISTIC_WORST, 0.10, 1, "%"},
+	{"colour of sun and sky, three bands against a spectrum, in x, y", TALLY_SKY_COLOUR, STATISTIC_WORST, 0.02, 1, ""},
+	{"luminance likewise", TALLY_SKY_LUMINANCE, STATISTIC_WORST, 0.12, 1, "%"},
 };
 
 void tally_add(struct tally *tally, double error, const char *format, ...)

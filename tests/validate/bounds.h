@@ -39,6 +39,12 @@ enum tally_id {
 	TALLY_COLD,      /* ms: least of several, of one distribution */
 	TALLY_DISK,
 	TALLY_MEMORY,
+	TALLY_SKY_ABSOLUTE, /* clear sky, relative: against discrete ordinates; of photons what their error does not explain */
+	TALLY_SKY_RELATIVE,
+	TALLY_SKY_PHOTONS,
+	TALLY_SKY_PHOTONS_RELATIVE,
+	TALLY_SKY_COLOUR, /* distance of chromaticities x, y */
+	TALLY_SKY_LUMINANCE,
 	TALLY_COUNT
 };
 

@@ -212,22 +212,30 @@ void camera_matrix(const struct scene_camera &camera, float matrix[16])
 	matrix[15] = 1;
 }
 
+/* height: of the picture at distance 1 */
+void describe_perspective(ImageSpec &spec, const struct scene_camera &camera, double height)
+{
+	float matrix[16];
+	camera_matrix(camera, matrix);
+	spec.attribute("worldtocamera", OIIO::TypeMatrix44, matrix);
+	spec.attribute("screenWindowWidth", static_cast<float>(height * spec.width / spec.height));
+}
+
 void describe_projection(ImageSpec &spec, const struct scene &scene)
 {
 	switch (scene.camera.projection) {
-	case PROJECTION_PERSPECTIVE: {
-		float matrix[16];
-		camera_matrix(scene.camera, matrix);
-		spec.attribute("worldtocamera", OIIO::TypeMatrix44, matrix);
-		const double height = 2 * std::tan(scene.camera.vertical_fov_deg * M_PI / 360);
-		spec.attribute("screenWindowWidth", static_cast<float>(height * spec.width / spec.height));
+	case PROJECTION_PERSPECTIVE:
+		describe_perspective(spec, scene.camera, 2 * std::tan(scene.camera.vertical_fov_deg * M_PI / 360));
 		break;
-	}
 	case PROJECTION_EQUIRECTANGULAR:
 		spec.attribute("textureformat", "LatLong Environment");
 		spec.attribute("openexr:levelmode", 0); /* one level: scan lines, no pyramid */
 		break;
 	case PROJECTION_CUBEMAP:
+		if (scene.camera.face != FACE_ALL) {
+			describe_perspective(spec, scene.camera, 2);
+			break;
+		}
 		spec.attribute("textureformat", "CubeFace Environment");
 		spec.attribute("openexr:levelmode", 0);
 		break;

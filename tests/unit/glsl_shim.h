@@ -157,6 +157,9 @@ static sampler3D slab_slices;
 static sampler2D transmittance_table, multiscatter_table, sky_total, sky_near, air_to_layer, air_to_end;
 static sampler2D ground_received, cloud_received;
 
+/* The sun's disc, of the box in the block's member sun_disc_box. */
+static std::vector<float> sun_disc_weights;
+
 /* Arguments of the pass, and what it stores. */
 static vec4 arguments[4], stored[8];
 #define STORE(index, value) stored[index] = (value)
@@ -178,6 +181,7 @@ static vec4 arguments[4], stored[8];
 	X(camera_up)                                                                                                                       \
 	X(camera_forward)                                                                                                                  \
 	X(image_size)                                                                                                                      \
+	X(sun_disc_box)                                                                                                                    \
 	X(cloud_layer)                                                                                                                     \
 	X(cloud_field)                                                                                                                     \
 	X(cloud_drift)                                                                                                                     \

@@ -67,7 +67,8 @@ static double corner_solid_angle(double x, double y)
 
 static double perspective_solid_angle(const struct camera_view *view, int column, int row)
 {
-	const double x[2] = {(2.0 * column / view->width - 1) * view->tangent[0], (2.0 * (column + 1) / view->width - 1) * view->tangent[0]};
+	const double x[2] = {(2.0 * column / view->width - 1) * view->tangent[0],
+			     (2.0 * (column + 1) / view->width - 1) * view->tangent[0]};
 	const double y[2] = {(2.0 * row / view->height - 1) * view->tangent[1], (2.0 * (row + 1) / view->height - 1) * view->tangent[1]};
 	return corner_solid_angle(x[1], y[1]) - corner_solid_angle(x[0], y[1]) - corner_solid_angle(x[1], y[0]) +
 	       corner_solid_angle(x[0], y[0]);

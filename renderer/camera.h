@@ -2,7 +2,8 @@
  * shaders/lib/camera.glsl, in double precision and with their inverse.
  *
  * Perspective: gnomonic. Fisheye: equidistant over 180 degrees, zenith in the middle, north up and so east on the left; nothing outside of
- * its circle. Equirectangular: azimuth/360 across from the left, (90 - elevation)/180 down. Cubemap: faces of 90 degrees, each a perspective.
+ * its circle. Equirectangular: azimuth/360 across from the left, (90 - elevation)/180 down. Cubemap: faces of 90 degrees, each a
+ * perspective.
  *
  * Points are in pixels from the upper left corner of the picture, x to the right and y down; centres of pixels lie at halves. Directions
  * are east, north, up, of any length but 0. Any thread.

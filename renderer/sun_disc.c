@@ -54,10 +54,16 @@ static bool shows_sky(const struct camera_view *view, int column, int row, doubl
 	return camera_direction(view, centre, direction) && direction[2] > horizon_sine + 1e-6;
 }
 
-/* The pixel around a point that shows the sky, or the nearest such neighbour. */
-static bool pixel_of(const struct camera_view *view, const double at[2], double horizon_sine, struct sample *sample)
+static void add(struct samples *samples, int column, int row, double light)
+{
+	samples->list[samples->count++] = (struct sample){column, row, light};
+}
+
+/* To the pixel around a point, or where that does not show the sky to the nearest neighbour that does. */
+static void add_to_nearest(struct samples *samples, const struct camera_view *view, const double at[2], double horizon_sine, double light)
 {
 	const int column = (int)floor(at[0]), row = (int)floor(at[1]);
+	int found[2] = {0};
 	double nearest = INFINITY;
 	for (int ring = 0; ring <= 1 && nearest == INFINITY; ring++)
 		for (int y = row - ring; y <= row + ring; y++)
@@ -66,10 +72,30 @@ static bool pixel_of(const struct camera_view *view, const double at[2], double 
 				if (distance >= nearest || !shows_sky(view, wrapped(view, x), y, horizon_sine))
 					continue;
 				nearest = distance;
-				sample->column = wrapped(view, x);
-				sample->row = y;
+				found[0] = wrapped(view, x);
+				found[1] = y;
 			}
-	return nearest < INFINITY;
+	if (nearest < INFINITY)
+		add(samples, found[0], found[1], light);
+}
+
+/* To the four pixels whose centres are around a point, so that their mean place is the point's: of a disc smaller than a pixel, the pixel
+ * around it alone would be up to half a pixel off, and cosine integrals with it. */
+static void add_between(struct samples *samples, const struct camera_view *view, const double at[2], double horizon_sine, double light)
+{
+	const int column = (int)floor(at[0] - 0.5), row = (int)floor(at[1] - 0.5);
+	const double x = at[0] - 0.5 - column, y = at[1] - 0.5 - row;
+	double shares[4], sum = 0;
+	for (int i = 0; i < 4; i++) {
+		const bool shown = shows_sky(view, wrapped(view, column + (i & 1)), row + (i >> 1), horizon_sine);
+		shares[i] = shown ? (i & 1 ? x : 1 - x) * (i >> 1 ? y : 1 - y) : 0;
+		sum += shares[i];
+	}
+	if (sum < 1e-6)
+		add_to_nearest(samples, view, at, horizon_sine, light);
+	for (int i = 0; i < 4 && sum >= 1e-6; i++)
+		if (shares[i] > 0)
+			add(samples, wrapped(view, column + (i & 1)), row + (i >> 1), light * shares[i] / sum);
 }
 
 /* --- spreading ---------------------------------------------------------------------------------------------------------------------- */
@@ -79,6 +105,7 @@ static void spread(struct samples *samples, int count, const struct camera_view 
 {
 	/* Vogel's spiral: evenly dense in any direction, whatever shape the pixels have. */
 	const double golden = M_PI * (3 - sqrt(5)), turn[2] = {cos(golden), sin(golden)};
+	const bool soft = camera_pixel_angle(view) > radius;
 	double a[3], b[3], heading[2] = {1, 0};
 	perpendiculars(sun, a, b);
 	for (int i = 0; i < count; i++) {
@@ -95,11 +122,12 @@ static void spread(struct samples *samples, int count, const struct camera_view 
 			continue;
 		samples->visible += light;
 		double at[2];
-		struct sample *sample = &samples->list[samples->count];
-		if (camera_project(view, direction, at) && pixel_of(view, at, horizon_sine, sample)) {
-			sample->light = light;
-			samples->count++;
-		}
+		if (!camera_project(view, direction, at))
+			continue;
+		if (soft)
+			add_between(samples, view, at, horizon_sine, light);
+		else
+			add_to_nearest(samples, view, at, horizon_sine, light);
 	}
 }
 
@@ -177,7 +205,7 @@ bool sun_disc_init(struct sun_disc *disc, const struct camera_view *view, const 
 	const double pixels = pixels_of(view, sun, radius);
 	disc->large = view->projection == PROJECTION_PERSPECTIVE && pixels > LARGE_PIXELS;
 	const int count = disc->large ? SAMPLES_MIN : (int)fmin(fmax(SAMPLES_PER_PIXEL * pixels, SAMPLES_MIN), SAMPLES_MAX);
-	struct samples samples = {.list = malloc((size_t)count * sizeof *samples.list)};
+	struct samples samples = {.list = malloc(4 * (size_t)count * sizeof *samples.list)};
 	bool ok = samples.list;
 	if (ok) {
 		spread(&samples, count, view, sun, radius, horizon_sine);

@@ -9,8 +9,9 @@
 struct sun_disc {
 	int column, row;   /* upper left corner of the box of pixels that hold some of the disc */
 	int width, height; /* of the box; 0: the view does not show the disc */
-	/* Per pixel of the box, row by row: share of the disc's light over the pixel's solid angle, 1/sr. Times solid angles it adds up to 1
-	 * when the view shows the whole disc. A box that reaches over the right edge of an equirectangular picture goes on at the left. */
+	/* Per pixel of the box, row by row: share of the disc's light over the pixel's solid angle, 1/sr. Times solid angles it adds up to
+	 * 1 when the view shows the whole disc. A box that reaches over the right edge of an equirectangular picture goes on at the left.
+	 */
 	float *weights;
 	bool large;     /* instead: a perspective's disc over so many pixels that each can be taken by itself (sun_disc.glsl) */
 	double visible; /* share of the disc's light that comes from above the horizon */
@@ -21,8 +22,8 @@ struct sun_disc {
 #define SUN_LIMB_DARKENING 0.6
 
 /* Spreads the disc (direction `sun` of length 1, angular radius in rad) over a view's pixels. What of the disc lies below the horizon (sine
- * of its elevation) is left out and the rest made 1; pixels whose centre shows nothing of the sky, below the horizon or beyond the fisheye's
- * circle, leave their share to their neighbours. false when out of memory. */
+ * of its elevation) is left out and the rest made 1; pixels whose centre shows nothing of the sky, below the horizon or beyond the
+ * fisheye's circle, leave their share to their neighbours. false when out of memory. */
 bool sun_disc_init(struct sun_disc *disc, const struct camera_view *view, const double sun[3], double radius, double horizon_sine);
 
 /* Takes a zeroed disc. */

@@ -2,16 +2,11 @@
 
 #include "renderer/log.h"
 #include "renderer/stages/colour.h"
-#include "renderer/sun_disc.h"
 
-#include <epoxy/gl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Of the shader storage buffer in shaders/lib/sun_disc.glsl. */
-enum { DISC_BINDING = 1 };
 
 /* OpenGL grants 16 samplers; each side leaves some out. */
 #define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "ground_relief"
@@ -55,7 +50,6 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
-	glCreateBuffers(1, &stage->disc_buffer);
 	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
@@ -71,8 +65,7 @@ void view_stage_finish(struct view_stage *stage)
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	pass_destroy(stage->develop);
-	if (stage->disc_buffer)
-		glDeleteBuffers(1, &stage->disc_buffer);
+	disc_buffer_finish(&stage->disc);
 	*stage = (struct view_stage){0};
 }
 
@@ -249,27 +242,6 @@ static bool run_whole(struct view_stage *stage, const struct camera_view *view, 
 	return pass;
 }
 
-/* Hands the sun's disc in a view to the shaders; *large says in which form. The caller uploads the block. */
-static bool fill_disc(struct view_stage *stage, struct scene_block *block, const struct camera_view *view, bool *large)
-{
-	static const float nothing = 0;
-	const double sun[3] = {block->sun_direction[0], block->sun_direction[1], block->sun_direction[2]};
-	struct sun_disc disc;
-	if (!sun_disc_init(&disc, view, sun, block->sun_direction[3], horizon_sine(block, 0)))
-		return false;
-	const size_t count = (size_t)disc.width * (size_t)disc.height;
-	glNamedBufferData(stage->disc_buffer, (GLsizeiptr)((count ? count : 1) * sizeof nothing), count ? disc.weights : &nothing,
-			  GL_DYNAMIC_DRAW);
-	glBindBufferBase(GL_SHADER_STORAGE_BUFFER, DISC_BINDING, stage->disc_buffer);
-	if (disc.large)
-		set4(block->sun_disc_box, disc.visible > 0 ? 1 / disc.visible : 0, 0, 0, 0);
-	else
-		set4(block->sun_disc_box, disc.column, disc.row, disc.width, disc.height);
-	*large = disc.large;
-	sun_disc_finish(&disc);
-	return true;
-}
-
 /* One view of the picture after the other. */
 static bool run_views(struct view_stage *stage, struct stage_context *context, const struct scene *scene, struct view_variant variant,
 		      struct pass_run *run)
@@ -280,9 +252,9 @@ static bool run_views(struct view_stage *stage, struct stage_context *context, c
 	for (int i = 0; i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
 		variant.projection = view.projection;
+		variant.large_sun = stage->disc.views[i].large;
 		fill_camera(&context->block, scene, &view);
-		if (!fill_disc(stage, &context->block, &view, &variant.large_sun))
-			return false;
+		disc_buffer_bind(&stage->disc, i, &context->block);
 		stage_upload_block(context);
 		if (!(whole ? run_whole(stage, &view, variant, run) : run_regions(stage, context, &view, variant, run)))
 			return false;
@@ -348,8 +320,11 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 			missing[missing_count++] = layers[i];
 		}
 	}
-	if (missing_count > 0)
+	if (missing_count > 0) {
 		context->reused = false;
+		if (!disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0)))
+			return false;
+	}
 	for (int i = 0; i < missing_count;) {
 		if (cancelled && cancelled(cancel_context))
 			return false;

@@ -5,6 +5,7 @@
 #ifndef STRATUS_RENDERER_STAGES_VIEW_H
 #define STRATUS_RENDERER_STAGES_VIEW_H
 
+#include "renderer/stages/disc.h"
 #include "renderer/stages/radiosity.h"
 
 /* Layers that one run of the view pass makes. */
@@ -33,7 +34,7 @@ struct view_stage {
 	 * others with the first picture that wants them. */
 	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2];
 	struct pass *develop;
-	unsigned disc_buffer; /* OpenGL name of the weights of the sun's disc (renderer/sun_disc.h) */
+	struct disc_buffer disc; /* of the last picture made */
 };
 
 struct view_inputs {

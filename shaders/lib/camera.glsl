@@ -28,6 +28,18 @@ vec3 camera_ray(vec2 at)
 #endif
 }
 
+// Side of the square that a pixel covers on a horizontal surface, m: at a distance and a cosine to the vertical. The strip that it really
+// covers is longer, by the root of the cosine on both sides; where rows of pixels run along the horizon this keeps detail across. In the
+// fisheye they run at any angle, and what is finer than the strip is long would come out as dots.
+float camera_footprint(float distance, float cosine)
+{
+#if VIEW_PROJECTION == 1
+	return camera_position.w * distance / cosine;
+#else
+	return camera_position.w * distance * inversesqrt(cosine);
+#endif
+}
+
 // Is there a picture at all? Not beyond the fisheye's circle.
 bool camera_shows(vec2 at)
 {

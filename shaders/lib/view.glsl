@@ -265,7 +265,7 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	float t = sphere_distance_up(camera_position.z, direction.z, base);
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
-	view_point p = view_point_at(direction, place, camera_position.w * t * inversesqrt(cos_view), cos_view, view_sun_cosine(direction, t, base));
+	view_point p = view_point_at(direction, place, camera_footprint(t, cos_view), cos_view, view_sun_cosine(direction, t, base));
 
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
 	view_layer_sunlight(p, vec3(textureLod(air_to_end, air, 0.0)) * float(p.thickness > 0.01), parts);

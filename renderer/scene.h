@@ -62,9 +62,14 @@ enum layer {
 	LAYER_COUNT
 };
 
+/* Where the sun stands; where by_time is set, because of time and place, which no stage looks at: they go into files. */
 struct scene_sun {
 	double elevation_deg; /* -18..90 */
 	double azimuth_deg;   /* 0..360 */
+	bool by_time;
+	double julian_day;    /* universal time */
+	double latitude_deg;  /* -90..90, north */
+	double longitude_deg; /* -180..180, east */
 };
 
 /* Modified gamma droplet size distribution, N(r) = N0 / (Gamma(gamma) rn) (r/rn)^(gamma-1) exp(-r/rn), re = (gamma + 2) rn. */

@@ -314,6 +314,28 @@ static void up_at_the_poles(void **)
 	}
 }
 
+/* No row of the sky's table is far from the next: finest at the horizon, and not only the sine even at the poles. */
+static void sky_rows_are_dense(void **)
+{
+	for (double height : {2., 12000.}) {
+		glsl::camera_position = vec4(0, 0, (float)height, 0);
+		for (int half = 0; half < 2; half++) {
+			double widest = 0, before = 0;
+			for (int row = 0; row < 80; row++) {
+				const double sine = (double)sky_table_parameters(ivec2(0, 80 * half + row)).x;
+				const double elevation = std::asin(sine) * 180 / M_PI;
+				if (row == 1)
+					assert_true(std::fabs(elevation - before) < 0.02);
+				if (row > 0)
+					widest = std::fmax(widest, std::fabs(elevation - before));
+				before = elevation;
+			}
+			assert_near(std::fabs(before), 90, 0.05);
+			assert_true(widest < 2.5);
+		}
+	}
+}
+
 /* The shader's mappings are those of renderer/camera.c. */
 static void projections_agree_with_the_processor(void **)
 {
@@ -361,6 +383,7 @@ int main()
 		cmocka_unit_test(roll_turns_the_picture_clockwise),
 		cmocka_unit_test(up_at_the_poles),
 		cmocka_unit_test(projections_agree_with_the_processor),
+		cmocka_unit_test(sky_rows_are_dense),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

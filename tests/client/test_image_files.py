@@ -153,3 +153,12 @@ def test_panoramas(samples, name, meaning):
     assert spec.getattribute("textureformat") == meaning
     assert spec.getattribute("worldToCamera") is None
     assert spec.tile_width == 0
+
+
+def test_a_face_is_a_camera(samples):
+    """Face +Z looks south with west on the right: camera space has x = -X, y = Y, z = Z of the file's world."""
+    spec, _ = read(samples / "face.exr", "float")
+    assert spec.getattribute("textureformat") is None
+    matrix = numpy.array(spec.getattribute("worldToCamera")).reshape(4, 4)
+    assert matrix[:3, :3] == pytest.approx(numpy.diag([-1, 1, 1]))
+    assert spec.getattribute("screenWindowWidth") == pytest.approx(2 * WIDTH / HEIGHT)

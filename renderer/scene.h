@@ -124,7 +124,11 @@ struct scene_model {
 	enum model_name name;
 	enum shading shading;
 	enum optics_model optics;
+	uint32_t paths; /* kinds of light that pictures show: bit set of 1 << (layer - LAYER_SUN_DIRECT), up to LAYER_AIR; never empty */
 };
+
+/* All of them. */
+#define SCENE_PATHS_ALL ((1u << (LAYER_AIR - LAYER_SUN_DIRECT + 1)) - 1)
 
 struct scene_output {
 	int width;  /* 16..8192 */
@@ -191,5 +195,6 @@ extern const char *const scene_png_compression_names[];
 extern const char *const scene_exr_compression_names[];
 extern const char *const scene_exr_type_names[];
 extern const char *const scene_layer_names[];
+extern const char *const scene_path_names[]; /* those of the layers that color is the sum of */
 
 #endif

@@ -109,6 +109,8 @@ static bool is_meaningful(const struct scene_field *field, const struct scene *s
 		const bool is_angle = strcmp(field->name, "elevation_deg") == 0 || strcmp(field->name, "azimuth_deg") == 0;
 		return is_angle != scene->sun.by_time;
 	}
+	if (strcmp(field->section, "model") == 0 && strcmp(field->name, "paths") == 0)
+		return scene->model.paths != SCENE_PATHS_ALL;
 	if (strcmp(field->section, "ground") == 0 && strcmp(field->name, "albedo") == 0)
 		return scene->ground.type == GROUND_LAMBERT;
 	if (strcmp(field->section, "camera") == 0)

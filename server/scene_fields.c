@@ -57,6 +57,7 @@ const struct scene_field scene_fields[] = {
 	 .choices_later = LATER(MODEL_REFERENCE) | LATER(MODEL_VOLUME) | LATER(MODEL_PLANAR)},
 	{"model", "shading", FIELD_CHOICE, AT(scene.model.shading), .choices = scene_shading_names},
 	{"model", "optics", FIELD_CHOICE, AT(scene.model.optics), .choices = scene_optics_names},
+	{"model", "paths", FIELD_CHOICES, AT(scene.model.paths), .choices = scene_path_names},
 
 	{"output", "width", FIELD_INTEGER, AT(scene.output.width), BETWEEN(16, 8192)},
 	{"output", "height", FIELD_INTEGER, AT(scene.output.height), BETWEEN(16, 8192)},

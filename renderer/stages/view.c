@@ -113,7 +113,8 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 				 camera->roll_deg,
 				 camera->vertical_fov_deg,
 				 camera->projection,
-				 camera->face};
+				 camera->face,
+				 scene->model.paths};
 	struct cache_key key = cache_key_make("view");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
@@ -278,7 +279,10 @@ static bool run_group(struct view_stage *stage, struct stage_context *context, c
 {
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const struct view_variant variant = view_variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR);
+	const bool some_paths = scene->model.paths != SCENE_PATHS_ALL;
+	const struct view_variant variant = view_variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR || some_paths);
+	for (int i = 0; i <= LAYER_AIR - LAYER_SUN_DIRECT; i++)
+		run.arguments[1 + i / 4][i % 4] = (float)(scene->model.paths >> i & 1);
 	view_bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];

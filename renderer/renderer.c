@@ -244,9 +244,10 @@ static struct scene_light scene_light_of(const struct job *job)
 	const double mu = fmax(0, sin(job->scene->sun.elevation_deg * M_PI / 180));
 	const bool below = job->clouds && job->scene->camera.position_m[2] < job->scene->clouds.base_m;
 	const bool high = job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
+	const float *beam = job->renderer->context.block.sun_at_camera;
 	double direct[3], diffuse[3];
 	for (int band = 0; band < 3; band++) {
-		direct[band] = below ? job->light.ground_direct[band] : mu * (high ? job->sky.sun_cloud : job->sky.sun_ground)[band];
+		direct[band] = below ? job->light.ground_direct[band] : mu * beam[band];
 		diffuse[band] = below ? job->light.ground_diffuse[band] : (high ? job->sky.diffuse_cloud : job->sky.diffuse_ground)[band];
 	}
 	return (struct scene_light){

@@ -46,9 +46,8 @@ const struct scene_field scene_fields[] = {
 	{"camera", "elevation_deg", FIELD_NUMBER, AT(scene.camera.elevation_deg), BETWEEN(-90, 90)},
 	{"camera", "roll_deg", FIELD_NUMBER, AT(scene.camera.roll_deg), BETWEEN(-180, 180)},
 	{"camera", "vertical_fov_deg", FIELD_NUMBER, AT(scene.camera.vertical_fov_deg), BETWEEN(0.5, 150)},
-	{"camera", "projection", FIELD_CHOICE, AT(scene.camera.projection), .choices = scene_projection_names,
-	 .choices_later = LATER(PROJECTION_FISHEYE) | LATER(PROJECTION_EQUIRECTANGULAR) | LATER(PROJECTION_CUBEMAP)},
-	{"camera", "face", FIELD_NAME, AT(face), .flags = FIELD_LATER | FIELD_INPUT_ONLY},
+	{"camera", "projection", FIELD_CHOICE, AT(scene.camera.projection), .choices = scene_projection_names},
+	{"camera", "face", FIELD_CHOICE, AT(scene.camera.face), .choices = scene_face_names},
 
 	{"radiosity", "enabled", FIELD_BOOLEAN, AT(scene.radiosity.enabled)},
 	{"radiosity", "tolerance", FIELD_NUMBER, AT(scene.radiosity.tolerance), BETWEEN(1e-6, 1)},

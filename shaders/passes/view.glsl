@@ -39,14 +39,16 @@ vec3 view_layer(view_parts p, int layer)
 
 void pass(ivec2 pixel)
 {
-	view_parts parts = view_ray(camera_ray(vec2(pixel) + 0.5));
+	vec2 at = vec2(pixel) + 0.5;
+	view_parts parts = view_ray(camera_ray(at), vec3(sun_at_camera) * sun_disc_share(pixel));
+	float shown = camera_shows(at) ? 1.0 : 0.0;
 #if VIEW_COLOR_ONLY
-	STORE(0, vec4(colour_of_bands(view_sum(parts)), 1.0));
+	STORE(0, vec4(shown * colour_of_bands(view_sum(parts)), 1.0));
 #else
 	view_show_paths(parts);
-	STORE(0, vec4(view_layer(parts, int(arguments[0].x)), 1.0));
-	STORE(1, vec4(view_layer(parts, int(arguments[0].y)), 1.0));
-	STORE(2, vec4(view_layer(parts, int(arguments[0].z)), 1.0));
-	STORE(3, vec4(view_layer(parts, int(arguments[0].w)), 1.0));
+	STORE(0, vec4(shown * view_layer(parts, int(arguments[0].x)), 1.0));
+	STORE(1, vec4(shown * view_layer(parts, int(arguments[0].y)), 1.0));
+	STORE(2, vec4(shown * view_layer(parts, int(arguments[0].z)), 1.0));
+	STORE(3, vec4(shown * view_layer(parts, int(arguments[0].w)), 1.0));
 #endif
 }

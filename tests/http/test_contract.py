@@ -23,6 +23,7 @@ BESIDE = {
     ("ground", "albedo"): {"ground": {"type": "lambert"}},
     ("output", "layers"): {"output": {"format": "exr"}},
     ("camera", "position_m"): {"clouds": {"type": "none"}},
+    ("camera", "face"): {"camera": {"projection": "cubemap"}},
 }
 # On these bounds another rule speaks: the sun below the horizon, the range of the effective radius.
 ELSEWHERE = {("sun", "latitude_deg"), ("sun", "longitude_deg"), ("dsd", "characteristic_radius_um")}

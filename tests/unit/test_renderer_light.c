@@ -78,7 +78,7 @@ static void disc_holds_the_beam(void **state)
 			}
 		const double wanted = frame.direct_illuminance_lux / sin(40 * DEGREE);
 		print_message("disc over %d pixels a side: %.4f of the beam\n", size, lux / wanted);
-		assert_float_equal(lux / wanted, 1, 0.03);
+		assert_float_equal(lux / wanted, 1, 0.002);
 		frame_finish(&frame);
 	}
 }

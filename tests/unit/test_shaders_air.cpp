@@ -1,5 +1,6 @@
 /* The GLSL library compiled for the processor: rays over the sphere, air, camera and sky tables, against independent values. */
 extern "C" {
+#include "renderer/camera.h"
 #include "renderer/scene.h"
 #include "renderer/stages/view.h"
 }
@@ -20,6 +21,22 @@ namespace air
 #include "shaders/lib/scattering.glsl"
 #include "shaders/lib/sky_table.glsl"
 } // namespace air
+
+/* The camera once for each projection. */
+#include "tests/unit/glsl_again.h"
+#undef VIEW_PROJECTION
+#define VIEW_PROJECTION 1
+namespace fisheye
+{
+#include "shaders/lib/camera.glsl"
+} // namespace fisheye
+#include "tests/unit/glsl_again.h"
+#undef VIEW_PROJECTION
+#define VIEW_PROJECTION 2
+namespace equirectangular
+{
+#include "shaders/lib/camera.glsl"
+} // namespace equirectangular
 } // namespace glsl
 
 using namespace glsl::air;
@@ -402,6 +419,59 @@ static void up_at_the_poles(void **)
 	}
 }
 
+/* No row of the sky's table is far from the next: finest at the horizon, and not only the sine even at the poles. */
+static void sky_rows_are_dense(void **)
+{
+	for (double height : {2., 12000.}) {
+		glsl::camera_position = vec4(0, 0, (float)height, 0);
+		for (int half = 0; half < 2; half++) {
+			double widest = 0, before = 0;
+			for (int row = 0; row < 80; row++) {
+				const double sine = (double)sky_table_parameters(ivec2(0, 80 * half + row)).x;
+				const double elevation = std::asin(sine) * 180 / M_PI;
+				if (row == 1)
+					assert_true(std::fabs(elevation - before) < 0.02);
+				if (row > 0)
+					widest = std::fmax(widest, std::fabs(elevation - before));
+				before = elevation;
+			}
+			assert_near(std::fabs(before), 90, 0.05);
+			assert_true(widest < 2.5);
+		}
+	}
+}
+
+/* The shader's mappings are those of renderer/camera.c. */
+static void projections_agree_with_the_processor(void **)
+{
+	static vec3 (*const rays[PROJECTION_COUNT])(vec2) = {glsl::air::camera_ray, glsl::fisheye::camera_ray,
+							     glsl::equirectangular::camera_ray, glsl::air::camera_ray};
+	static bool (*const shows[PROJECTION_COUNT])(vec2) = {glsl::air::camera_shows, glsl::fisheye::camera_shows,
+							      glsl::equirectangular::camera_shows, glsl::air::camera_shows};
+	for (int projection = 0; projection < PROJECTION_COUNT; projection++) {
+		struct scene scene = scene_default();
+		scene_block block = {};
+		scene.camera.projection = (enum projection)projection;
+		scene.camera.roll_deg = 20;
+		scene.camera.face = FACE_NEG_Y;
+		scene.output.width = projection == PROJECTION_EQUIRECTANGULAR ? 180 : 90;
+		scene.output.height = 90;
+		const camera_view view = camera_view_of(&scene, 0);
+		view_fill_block(&block, &scene);
+		glsl::set_scene_block(block);
+		assert_near(block.camera_position[3], camera_pixel_angle(&view), 1e-9);
+		for (int y = 0; y < view.height; y++)
+			for (int x = 0; x < view.width; x++) {
+				const double at[2] = {x + 0.5, y + 0.5};
+				double wanted[3];
+				const bool shown = camera_direction(&view, at, wanted);
+				const vec3 found = rays[projection](vec2((float)at[0], (float)at[1]));
+				assert_direction(found, vec3((float)wanted[0], (float)wanted[1], (float)wanted[2]));
+				assert_int_equal(shows[projection](vec2((float)at[0], (float)at[1])), shown);
+			}
+	}
+}
+
 int main()
 {
 	const CMUnitTest tests[] = {
@@ -422,6 +492,8 @@ int main()
 		cmocka_unit_test(camera_looks_where_it_should),
 		cmocka_unit_test(roll_turns_the_picture_clockwise),
 		cmocka_unit_test(up_at_the_poles),
+		cmocka_unit_test(projections_agree_with_the_processor),
+		cmocka_unit_test(sky_rows_are_dense),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

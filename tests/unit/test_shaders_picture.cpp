@@ -260,6 +260,10 @@ static void copy_textures(const made &out)
 	glsl::slab_slices = copy_of_volume(out.slab_slices);
 	glsl::ground_received = copy_of(out.light.ground_received);
 	glsl::cloud_received = copy_of(out.light.cloud_received);
+	GLint bytes = 0;
+	glGetNamedBufferParameteriv(shared.view.disc.buffer, GL_BUFFER_SIZE, &bytes);
+	glsl::sun_disc_weights.resize((size_t)bytes / sizeof(float));
+	glGetNamedBufferSubData(shared.view.disc.buffer, 0, bytes, glsl::sun_disc_weights.data());
 }
 
 static picture render_cpu(int variant, const made &out)

@@ -77,6 +77,8 @@ static void write_value(const struct scene_field *field, const struct scene_inpu
 		write_choices(field, *(const uint32_t *)value, style, text);
 		break;
 	case FIELD_NAME:
+	case FIELD_ASSET:
+	case FIELD_HASH:
 		write_word(value, style, text);
 		break;
 	}
@@ -84,10 +86,23 @@ static void write_value(const struct scene_field *field, const struct scene_inpu
 		text_add(text, "]");
 }
 
+static bool is_one_of(const char *name, const char *const *names)
+{
+	return name_index(names, name) >= 0;
+}
+
 /* Has the member a meaning in this scene? Those without are refused when given, so the canonical form must not hold them. */
 static bool is_meaningful(const struct scene_field *field, const struct scene *scene)
 {
+	static const char *const procedural[] = {"type", "seed", "coverage", "albedo", NULL};
+	const bool clouds = strcmp(field->section, "clouds") == 0, ground = strcmp(field->section, "ground") == 0;
+	static const struct scene_map_choice none;
+	const struct scene_map_choice *map = clouds ? &scene->clouds.map : ground ? &scene->ground.map : &none;
 	if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER))
+		return false;
+	if (field->type == FIELD_ASSET || field->type == FIELD_HASH)
+		return field->type == FIELD_ASSET ? *map->name : *map->hash;
+	if (*map->name && is_one_of(field->name, procedural))
 		return false;
 	if (strcmp(field->section, "ground") == 0 && strcmp(field->name, "albedo") == 0)
 		return scene->ground.type == GROUND_LAMBERT;
@@ -128,6 +143,8 @@ char *scene_canonical_query(const struct scene *scene)
 	struct text text = {0};
 	for (const struct scene_field *field = scene_fields; field->section; field++) {
 		struct text value = {0}, usual = {0};
+		if (field->type == FIELD_HASH)
+			continue; /* the address names the asset, whatever that holds when it is asked */
 		write_value(field, &input, STYLE_QUERY, &value);
 		write_value(field, &defaults, STYLE_QUERY, &usual);
 		bool differs = value.failed || usual.failed || strcmp(value.data, usual.data) != 0;

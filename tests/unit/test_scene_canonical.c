@@ -64,6 +64,8 @@ static json_t *random_value(const struct scene_field *field)
 		return json_string(field->choices[choice]);
 	case FIELD_INTEGER:
 		return json_real(field->flags & FIELD_POWER_OF_TWO ? field->range[0].high : floor(random_in(&field->range[0])));
+	case FIELD_ASSET:
+		return json_string("some-map_1.png");
 	case FIELD_SEED:
 		return json_real(floor(random_in(&field->range[0])));
 	case FIELD_NUMBER_OR_AUTO:
@@ -73,13 +75,24 @@ static json_t *random_value(const struct scene_field *field)
 	}
 }
 
+/* Whether a field is for scenes with a map, for those without, or for both. A hash is a query's no member, and so left out here. */
+static bool suits(const struct scene_field *field, bool map)
+{
+	static const char *const procedural[] = {"type", "seed", "coverage", "albedo", NULL};
+	const bool either = strcmp(field->section, "clouds") == 0 || strcmp(field->section, "ground") == 0;
+	if (field->type == FIELD_HASH)
+		return false;
+	return field->type == FIELD_ASSET ? map : !(map && either && name_index(procedural, field->name) >= 0);
+}
+
 /* A random scene that obeys the rules across members; the others are thrown away. */
 static bool random_scene(struct scene *scene)
 {
 	struct scene_input input = scene_input_default();
 	struct problem problem = {0};
+	const bool map = random_bits() % 4 == 0;
 	for (const struct scene_field *field = scene_fields; field->section; field++) {
-		if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER) || random_bits() % 3 == 0)
+		if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER) || !suits(field, map) || random_bits() % 3 == 0)
 			continue;
 		json_t *value = random_value(field);
 		scene_json_read_field(field, value, "/x", &input, &problem);

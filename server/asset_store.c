@@ -173,7 +173,7 @@ bool asset_store_list(struct asset_store *store, void (*visit)(void *context, co
 	return true;
 }
 
-/* Bytes of the picture in a file, by its size alone; 0: there is none. */
+/* Bytes of the picture in a file, by its size alone, at least 1; 0: it is no file. */
 static uint64_t bytes_of(int folder, const char *name)
 {
 	struct stat status;
@@ -193,8 +193,9 @@ static void usage_beside(struct asset_store *store, const char *name, size_t *co
 	for (struct dirent *entry; (entry = readdir(folder));) {
 		if (!asset_name_is_valid(entry->d_name) || (name && strcmp(name, entry->d_name) == 0))
 			continue;
-		++*count;
-		*bytes += bytes_of(dirfd(folder), entry->d_name);
+		const uint64_t size = bytes_of(dirfd(folder), entry->d_name);
+		*count += size > 0;
+		*bytes += size;
 	}
 	closedir(folder);
 }

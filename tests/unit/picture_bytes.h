@@ -10,12 +10,15 @@
 
 struct file_bytes {
 	unsigned char *data;
-	size_t size;
+	size_t size, room;
 };
 
 static inline void put(struct file_bytes *to, const void *data, size_t size)
 {
-	to->data = realloc(to->data, to->size + size + 1);
+	if (to->size + size > to->room) {
+		to->room = 2 * (to->size + size);
+		to->data = realloc(to->data, to->room);
+	}
 	memcpy(to->data + to->size, data, size);
 	to->size += size;
 }
@@ -38,12 +41,14 @@ static inline void bytes_finish(struct file_bytes *bytes)
 
 static inline uint32_t png_crc(const unsigned char *data, size_t size)
 {
-	uint32_t crc = 0xffffffff;
-	for (size_t i = 0; i < size; i++) {
-		crc ^= data[i];
+	uint32_t table[256], crc = 0xffffffff;
+	for (uint32_t i = 0; i < 256; i++) {
+		table[i] = i;
 		for (int k = 0; k < 8; k++)
-			crc = crc >> 1 ^ (crc & 1 ? 0xedb88320 : 0);
+			table[i] = table[i] >> 1 ^ (table[i] & 1 ? 0xedb88320 : 0);
 	}
+	for (size_t i = 0; i < size; i++)
+		crc = crc >> 8 ^ table[(crc ^ data[i]) & 255];
 	return ~crc;
 }
 

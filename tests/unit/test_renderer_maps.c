@@ -5,15 +5,19 @@
 
 enum { SIDE = 8, PICTURE = 32 };
 
-/* Maps that live to the end of the program. Each is another content. */
+/* All maps, of the whole program. */
+static const struct scene_map *made[256];
+static int made_count;
+
+/* Each is another content. Lives to the end of the program. */
 static const struct scene_map *map_of(int width, int height, int channels, const float *values)
 {
-	static unsigned char next[SCENE_MAP_HASH_BYTES];
-	next[0]++;
+	unsigned char next[SCENE_MAP_HASH_BYTES] = {(unsigned char)(made_count + 1)};
 	struct scene_map *map = scene_map_create(width, height, channels, next);
 	assert_non_null(map);
 	memcpy(map->values, values, (size_t)width * (size_t)height * (size_t)channels * sizeof *values);
 	scene_map_seal(map);
+	made[made_count++] = map;
 	return map;
 }
 
@@ -281,5 +285,8 @@ int main(void)
 		cmocka_unit_test(test_other_content_other_picture),
 		cmocka_unit_test(test_empty_map_is_clear),
 	};
-	return RUN_WITH_RENDERER(tests);
+	const int failed = RUN_WITH_RENDERER(tests);
+	while (made_count > 0)
+		scene_map_release(made[--made_count]);
+	return failed;
 }

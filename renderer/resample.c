@@ -26,7 +26,9 @@ static float mean_over(const struct line *line, double from, double to)
 static void reduce_line(const struct line *from, const struct line *to)
 {
 	const double scale = (double)from->count / to->count;
-	for (int i = 0; i < to->count; i++)
+	for (int i = 0; from->count == to->count && i < to->count; i++)
+		to->values[(size_t)i * to->step] = from->values[(size_t)i * from->step];
+	for (int i = 0; from->count > to->count && i < to->count; i++)
 		to->values[(size_t)i * to->step] = mean_over(from, i * scale, fmin((i + 1) * scale, from->count));
 }
 
@@ -102,7 +104,10 @@ static void resample_line(const struct line *from, const struct line *to, float 
 float *resample_periodic(const float *from, int width, int height, int channels, int to_width, int to_height)
 {
 	const size_t c = (size_t)channels, row = (size_t)width * c, to_row = (size_t)to_width * c;
-	float *wide = malloc((size_t)height * to_row * sizeof *wide), *to = malloc((size_t)to_height * to_row * sizeof *to);
+	float *to = malloc((size_t)to_height * to_row * sizeof *to);
+	if (to && width == to_width && height == to_height)
+		return memcpy(to, from, (size_t)height * row * sizeof *to);
+	float *wide = malloc((size_t)height * to_row * sizeof *wide);
 	float *slopes = malloc((size_t)(width > height ? width : height) * sizeof *slopes);
 	if (!wide || !to || !slopes) {
 		free(to);

@@ -107,24 +107,25 @@ static bool read_record(int fd, const struct stat *status, struct record *record
 	       strspn(record->hash, "0123456789abcdef") == DIGEST_SIZE - 1;
 }
 
-bool asset_store_open(struct asset_store *store, const char *name, struct asset_file *file)
+enum asset_result asset_store_open(struct asset_store *store, const char *name, struct asset_file *file)
 {
 	char path[PATH_MAX];
 	struct stat status;
 	struct record record;
 	*file = (struct asset_file){.fd = -1};
 	if (!asset_name_is_valid(name) || !path_of(store, name, path))
-		return false;
+		return ASSET_MISSING;
 	file->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
 	if (file->fd < 0) {
-		if (errno != ENOENT && errno != ENOTDIR)
+		const bool missing = errno == ENOENT || errno == ENOTDIR || errno == ELOOP;
+		if (!missing)
 			log_error("asset %s: %s", path, strerror(errno));
-		return false;
+		return missing ? ASSET_MISSING : ASSET_FAILED;
 	}
 	if (fstat(file->fd, &status) != 0 || !read_record(file->fd, &status, &record)) {
 		log_warning("asset %s: damaged, or of another version: not used", path);
 		asset_file_close(file);
-		return false;
+		return ASSET_MISSING;
 	}
 	file->bytes = record.bytes;
 	memcpy(file->hash, record.hash, sizeof file->hash);
@@ -132,7 +133,7 @@ bool asset_store_open(struct asset_store *store, const char *name, struct asset_
 	memcpy(file->facts.lowest, record.lowest, sizeof record.lowest);
 	memcpy(file->facts.highest, record.highest, sizeof record.highest);
 	file->modified = status.st_mtime;
-	return true;
+	return ASSET_OK;
 }
 
 void asset_file_close(struct asset_file *file)
@@ -163,7 +164,7 @@ bool asset_store_list(struct asset_store *store, void (*visit)(void *context, co
 	}
 	for (int i = 0; i < count; i++) {
 		struct asset_file file;
-		if (asset_store_open(store, entries[i]->d_name, &file))
+		if (asset_store_open(store, entries[i]->d_name, &file) == ASSET_OK)
 			visit(context, entries[i]->d_name, &file);
 		asset_file_close(&file);
 		free(entries[i]);
@@ -213,8 +214,11 @@ enum asset_result asset_store_check(struct asset_store *store, const char *name,
 	char tag[ENTITY_TAG_SIZE] = "";
 	if (!condition->if_match && !condition->if_none_match)
 		return ASSET_OK;
-	const bool exists = asset_store_open(store, name, &file);
+	const enum asset_result result = asset_store_open(store, name, &file);
+	const bool exists = result == ASSET_OK;
 	asset_file_close(&file);
+	if (result == ASSET_FAILED)
+		return result;
 	if (exists)
 		snprintf(tag, sizeof tag, "\"%s\"", file.hash);
 	if (condition->if_match && !(exists && entity_tag_is_expected(condition->if_match, tag)))
@@ -371,7 +375,7 @@ static enum asset_result put_in_place(struct asset_upload *upload, const char *p
 	if (count >= limits->count || bytes + upload->bytes > limits->total_bytes)
 		return ASSET_FULL;
 	struct asset_file old;
-	*created = !asset_store_open(upload->store, upload->name, &old);
+	*created = asset_store_open(upload->store, upload->name, &old) != ASSET_OK;
 	asset_file_close(&old);
 	if (!file_replace_finish(upload->fd, upload->temporary, path))
 		return failure("cannot be put in place", path);

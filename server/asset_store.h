@@ -54,8 +54,8 @@ const struct asset_limits *asset_store_limits(const struct asset_store *store);
 /* 1 to 63 letters, digits, '-', '_' and '.', the first no dot: such a name cannot leave a folder. */
 bool asset_name_is_valid(const char *name);
 
-/* false when there is none. asset_file_close in any case. */
-bool asset_store_open(struct asset_store *store, const char *name, struct asset_file *file);
+/* ASSET_OK (asset_file_close then), ASSET_MISSING, ASSET_FAILED. */
+enum asset_result asset_store_open(struct asset_store *store, const char *name, struct asset_file *file);
 void asset_file_close(struct asset_file *file);
 
 /* Calls `visit` for each picture, by name in alphabetical order. false (and a log line) when the folder cannot be read. */
@@ -65,7 +65,7 @@ bool asset_store_list(struct asset_store *store, void (*visit)(void *context, co
 /* How many there are and what they take. */
 void asset_store_usage(struct asset_store *store, size_t *count, uint64_t *bytes);
 
-/* May this condition's request change the name? ASSET_OK or ASSET_UNWANTED. */
+/* May this condition's request change the name? ASSET_OK, ASSET_UNWANTED, ASSET_FAILED. */
 enum asset_result asset_store_check(struct asset_store *store, const char *name, const struct asset_condition *condition);
 
 /* ASSET_OK, ASSET_MISSING, ASSET_UNWANTED, ASSET_FAILED. */

@@ -20,6 +20,9 @@
 #include <string.h>
 #include <unistd.h>
 
+/* Uploads are few at a time: one that never ends must not keep its place. */
+#define UPLOAD_MS_MAX 900000.0
+
 struct asset_work {
 	struct work examine; /* for the decoder */
 	struct request *request;
@@ -145,10 +148,9 @@ static enum MHD_Result send_file(struct request *request, const char *name)
 	struct asset_file file;
 	const struct asset_condition condition = condition_of(request);
 	char tag[ENTITY_TAG_SIZE];
-	if (!asset_store_open(request->service->assets, name, &file)) {
-		asset_file_close(&file);
-		return send_result(request, ASSET_MISSING);
-	}
+	const enum asset_result result = asset_store_open(request->service->assets, name, &file);
+	if (result != ASSET_OK)
+		return send_result(request, result);
 	tag_of(file.hash, tag);
 	if (condition.if_match && !entity_tag_is_expected(condition.if_match, tag)) {
 		asset_file_close(&file);
@@ -211,6 +213,8 @@ enum MHD_Result route_asset_begin(struct request *request)
 enum MHD_Result route_asset_take(struct request *request, const char *data, size_t size)
 {
 	struct asset_work *work = request->work;
+	if (clock_now_ms() > request->started_ms + UPLOAD_MS_MAX)
+		return MHD_NO;
 	for (size_t i = 0; i < size && work->magic_size < sizeof work->magic; i++)
 		work->magic[work->magic_size++] = (unsigned char)data[i];
 	enum asset_result result = asset_upload_append(work->upload, data, size);
@@ -261,6 +265,9 @@ static enum MHD_Result finish_put(struct request *request)
 		return send_result(request, work->received);
 	if (work->magic_size < sizeof work->magic || !picture_file_recognise(work->magic, &format))
 		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE, "An asset is a PNG or an EXR.");
+	/* However long the body took to come: unless the client says otherwise, looking through it has as long as any other answer. */
+	if (!request_header(request, "X-Timeout-Ms"))
+		work->deadline_ms = clock_now_ms() + service->config->timeout_ms;
 	work->examine.run = examine;
 	request_suspend(request, send_put);
 	if (!worker_pool_try(service->decoders, &work->examine)) {

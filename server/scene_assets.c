@@ -3,6 +3,7 @@
 #include "renderer/log.h"
 #include "server/clock.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -43,7 +44,8 @@ static void check_albedo(const struct asset_facts *facts, double scale, struct p
 			    (double)facts->lowest[ASSET_ALBEDO], highest);
 	else if (highest * scale > 1)
 		problem_add(problem, "/ground/albedo_scale",
-			    "times the map's largest reflectance, %.4g, exceeds 1: at most %.4g for this map", highest, 1 / highest);
+			    "times the map's largest reflectance, %.4g, exceeds 1: at most %.6g for this map", highest,
+			    floor(1e3 / highest) * 1e-3);
 }
 
 static void find(struct asset_store *store, struct scene *scene, int i, struct asset_file *file, struct problem *problem)
@@ -51,10 +53,13 @@ static void find(struct asset_store *store, struct scene *scene, int i, struct a
 	struct scene_map_choice *choice = choice_of(scene, i);
 	if (!*choice->name || problem_mentions(problem, members[i].pointer))
 		return;
-	if (!asset_store_open(store, choice->name, file)) {
+	const enum asset_result result = asset_store_open(store, choice->name, file);
+	if (result == ASSET_FAILED)
+		problem_set(problem, PROBLEM_INTERNAL, "The asset %s cannot be read.", choice->name);
+	if (result == ASSET_MISSING)
 		problem_add(problem, members[i].pointer, "there is no asset of this name; PUT /v1/assets/%s would make it", choice->name);
+	if (result != ASSET_OK)
 		return;
-	}
 	if (*choice->hash && strcmp(choice->hash, file->hash) != 0)
 		problem_add(problem, members[i].hash_pointer, "is not what the asset %s holds now, %s", choice->name, file->hash);
 	memcpy(choice->hash, file->hash, sizeof file->hash);

@@ -380,6 +380,9 @@ static enum asset_result put_in_place(struct asset_upload *upload, const char *p
 	if (!file_replace_finish(upload->fd, upload->temporary, path))
 		return failure("cannot be put in place", path);
 	upload->temporary[0] = '\0';
+	/* From here on it counts as a picture. */
+	upload->store->incoming_bytes -= upload->bytes;
+	upload->bytes = 0;
 	return ASSET_OK;
 }
 

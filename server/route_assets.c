@@ -242,6 +242,13 @@ static enum MHD_Result send_put(struct request *request)
 	return response_send(request, work->created ? MHD_HTTP_CREATED : MHD_HTTP_NO_CONTENT, response);
 }
 
+/* Before the answer goes out: who has it may begin the next upload. */
+static void end_upload(struct asset_work *work)
+{
+	asset_upload_destroy(work->upload);
+	work->upload = NULL;
+}
+
 static void examine(struct work *base)
 {
 	struct asset_work *work = (struct asset_work *)((char *)base - offsetof(struct asset_work, examine));
@@ -253,6 +260,7 @@ static void examine(struct work *base)
 	work->examined = !work->late && asset_examine(service->images, fd, size, &work->facts, work->error, sizeof work->error);
 	if (work->examined)
 		work->result = asset_upload_commit(work->upload, &work->facts, &work->condition, &work->created, work->hash);
+	end_upload(work);
 	request_resume(request);
 }
 
@@ -261,10 +269,14 @@ static enum MHD_Result finish_put(struct request *request)
 	struct asset_work *work = request->work;
 	struct service *service = request->service;
 	enum image_format format;
-	if (work->received != ASSET_OK)
+	if (work->received != ASSET_OK) {
+		end_upload(work);
 		return send_result(request, work->received);
-	if (work->magic_size < sizeof work->magic || !picture_file_recognise(work->magic, &format))
+	}
+	if (work->magic_size < sizeof work->magic || !picture_file_recognise(work->magic, &format)) {
+		end_upload(work);
 		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE, "An asset is a PNG or an EXR.");
+	}
 	/* However long the body took to come: unless the client says otherwise, looking through it has as long as any other answer. */
 	if (!request_header(request, "X-Timeout-Ms"))
 		work->deadline_ms = clock_now_ms() + service->config->timeout_ms;

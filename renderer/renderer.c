@@ -3,6 +3,7 @@
 #include "renderer/gl/context.h"
 #include "renderer/gl/timer.h"
 #include "renderer/log.h"
+#include "renderer/scene_map.h"
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/illuminance.h"
@@ -188,8 +189,17 @@ static bool run_optics(struct job *job)
 	return job->slab_rows && slab_slices_get(context, job->scene, job->droplets, &job->slab_slices);
 }
 
+/* Reflectance of a deck of this thickness over the ground, with all light between them. */
+static double deck_albedo(const struct job *job, int band, double thickness_m)
+{
+	const struct droplet_tables *droplets = job->droplets->tables;
+	const double tau = thickness_m * droplets->optics->extinction_per_m[band];
+	const double r = slab_spherical_albedo(droplets->slab, band, tau), t = 1 - r, ground = job->ground.mean[band];
+	return r + t * t * ground / (1 - r * ground);
+}
+
 /* What the air above gets back from below: the ground where it lies open, under clouds the deck and the ground behind it with all light
- * between them. A deck counts with 0.6 of its largest thickness, about the mean of its field. */
+ * between them. A deck counts with 0.6 of its largest thickness, about the mean of its field; a map by what it holds. */
 static void mean_albedo(const struct job *job, double albedo[3])
 {
 	for (int band = 0; band < 3; band++)
@@ -197,11 +207,13 @@ static void mean_albedo(const struct job *job, double albedo[3])
 	if (!job->droplets)
 		return;
 	const struct scene_clouds *clouds = &job->scene->clouds;
-	const struct droplet_tables *droplets = job->droplets->tables;
+	const struct scene_map *map = clouds->map.map;
 	for (int band = 0; band < 3; band++) {
-		const double tau = 0.6 * clouds->thickness_m * droplets->optics->extinction_per_m[band];
-		const double r = slab_spherical_albedo(droplets->slab, band, tau), t = 1 - r, ground = job->ground.mean[band];
-		albedo[band] += clouds->coverage * (r + t * t * ground / (1 - r * ground) - ground);
+		const double ground = job->ground.mean[band];
+		if (!map)
+			albedo[band] += clouds->coverage * (deck_albedo(job, band, 0.6 * clouds->thickness_m) - ground);
+		for (int i = 0; map && i < SCENE_MAP_BINS; i++)
+			albedo[band] += map->bins[i].share * (deck_albedo(job, band, map->bins[i].value * clouds->thickness_m) - ground);
 	}
 }
 

@@ -1,8 +1,8 @@
 /* The scene: everything a request may say, as one plain C tree.
  *
- * The server makes scenes out of JSON, the renderer only reads them. All members are values (no pointers), in the units of their
- * names (SI and degrees where the name says nothing else). A scene that reached the renderer has been validated: every number
- * lies in the range given here and is finite.
+ * The server makes scenes out of JSON, the renderer only reads them. All members are values, in the units of their names (SI and degrees
+ * where the name says nothing else); the two maps alone are held by whoever made the scene for as long as it is rendered. A scene that
+ * reached the renderer has been validated: every number lies in the range given here and is finite.
  *
  * Axes: x east, y north, z up, metres. Azimuth: degrees clockwise from north. Elevation: degrees above the horizon, unrefracted.
  */
@@ -12,7 +12,16 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { SCENE_NAME_MAX = 64 };
+enum { SCENE_NAME_MAX = 64, SCENE_HASH_SIZE = 33 };
+
+struct scene_map;
+
+/* A picture over the tile, by its name and what that holds now. */
+struct scene_map_choice {
+	char name[SCENE_NAME_MAX];   /* "": none */
+	char hash[SCENE_HASH_SIZE];  /* of the content, in hexadecimal */
+	const struct scene_map *map; /* what the renderer goes by; NULL: none */
+};
 
 enum cloud_type { CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_ALTOCUMULUS, CLOUD_CIRROCUMULUS, CLOUD_NONE, CLOUD_TYPE_COUNT };
 
@@ -82,21 +91,21 @@ struct scene_dsd {
 struct scene_clouds {
 	enum cloud_type type;
 	uint32_t seed;
-	double time_s;      /* 0..1e7 */
-	double coverage;    /* 0..1 */
-	double base_m;      /* 100..12000, above ground */
-	double thickness_m; /* 0..2000, the maximum of H */
-	double tile_m;      /* 2000..200000 */
-	int resolution;     /* 64..4096, a power of two */
-	double wind_mps[2]; /* direction of motion east, north; each within 100 */
-	char map[SCENE_NAME_MAX];
+	double time_s;               /* 0..1e7 */
+	double coverage;             /* 0..1 */
+	double base_m;               /* 100..12000, above ground */
+	double thickness_m;          /* 0..2000, the maximum of H */
+	double tile_m;               /* 2000..200000 */
+	int resolution;              /* 64..4096, a power of two */
+	double wind_mps[2];          /* direction of motion east, north; each within 100 */
+	struct scene_map_choice map; /* share of thickness_m, in place of type, seed and coverage */
 };
 
 struct scene_ground {
 	enum ground_type type;
-	double albedo[3];    /* 0..1 in Rec.709 red, green, blue; used by GROUND_LAMBERT alone */
-	double albedo_scale; /* 0..2, the product with the albedo never above 1 */
-	char map[SCENE_NAME_MAX];
+	double albedo[3];            /* 0..1 in Rec.709 red, green, blue; used by GROUND_LAMBERT alone */
+	double albedo_scale;         /* 0..2, the product with the albedo never above 1 */
+	struct scene_map_choice map; /* reflectance, in place of type and albedo; the type is then GROUND_LAMBERT */
 };
 
 struct scene_atmosphere {

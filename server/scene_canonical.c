@@ -83,6 +83,8 @@ static void write_value(const struct scene_field *field, const struct scene_inpu
 		write_choices(field, *(const uint32_t *)value, style, text);
 		break;
 	case FIELD_NAME:
+	case FIELD_ASSET:
+	case FIELD_HASH:
 		write_word(value, style, text);
 		break;
 	}
@@ -100,10 +102,23 @@ static bool is_meaningful_to_camera(const char *name, const struct scene_camera 
 	return camera->projection == PROJECTION_PERSPECTIVE;
 }
 
+static bool is_one_of(const char *name, const char *const *names)
+{
+	return name_index(names, name) >= 0;
+}
+
 /* Has the member a meaning in this scene? Those without are refused when given, so the canonical form must not hold them. */
 static bool is_meaningful(const struct scene_field *field, const struct scene *scene)
 {
+	static const char *const procedural[] = {"type", "seed", "coverage", "albedo", NULL};
+	const bool clouds = strcmp(field->section, "clouds") == 0, ground = strcmp(field->section, "ground") == 0;
+	static const struct scene_map_choice none;
+	const struct scene_map_choice *map = clouds ? &scene->clouds.map : ground ? &scene->ground.map : &none;
 	if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER))
+		return false;
+	if (field->type == FIELD_ASSET || field->type == FIELD_HASH)
+		return field->type == FIELD_ASSET ? *map->name : *map->hash;
+	if (*map->name && is_one_of(field->name, procedural))
 		return false;
 	if (strcmp(field->section, "sun") == 0) {
 		const bool is_angle = strcmp(field->name, "elevation_deg") == 0 || strcmp(field->name, "azimuth_deg") == 0;
@@ -163,6 +178,8 @@ char *scene_canonical_query(const struct scene *scene)
 		struct text value = {0}, usual = {0};
 		if (!is_meaningful(field, scene))
 			continue;
+		if (field->type == FIELD_HASH)
+			continue; /* the address names the asset, whatever that holds when it is asked */
 		write_value(field, &input, STYLE_QUERY, &value);
 		write_value(field, &defaults, STYLE_QUERY, &usual);
 		/* Time and place stand together or not at all. */

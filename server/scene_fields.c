@@ -30,13 +30,15 @@ const struct scene_field scene_fields[] = {
 	{"clouds", "tile_m", FIELD_NUMBER, AT(scene.clouds.tile_m), BETWEEN(2000, 200000)},
 	{"clouds", "resolution", FIELD_INTEGER, AT(scene.clouds.resolution), BETWEEN(64, 4096), .flags = FIELD_POWER_OF_TWO},
 	{"clouds", "wind_mps", FIELD_NUMBERS, AT(scene.clouds.wind_mps), .range = {{-100, 100}, {-100, 100}}, .count = 2},
-	{"clouds", "map", FIELD_NAME, AT(scene.clouds.map), .flags = FIELD_LATER},
+	{"clouds", "map", FIELD_ASSET, AT(scene.clouds.map.name)},
+	{"clouds", "map_hash", FIELD_HASH, AT(scene.clouds.map.hash)},
 
 	{"ground", "type", FIELD_CHOICE, AT(scene.ground.type), .choices = scene_ground_type_names,
 	 .choices_later = LATER(GROUND_GRASS) | LATER(GROUND_SOIL) | LATER(GROUND_SAND)},
 	{"ground", "albedo", FIELD_NUMBERS, AT(scene.ground.albedo), .range = {{0, 1}, {0, 1}, {0, 1}}, .count = 3},
 	{"ground", "albedo_scale", FIELD_NUMBER, AT(scene.ground.albedo_scale), BETWEEN(0, 2)},
-	{"ground", "map", FIELD_NAME, AT(scene.ground.map), .flags = FIELD_LATER},
+	{"ground", "map", FIELD_ASSET, AT(scene.ground.map.name)},
+	{"ground", "map_hash", FIELD_HASH, AT(scene.ground.map.hash)},
 
 	{"atmosphere", "aerosol_optical_depth", FIELD_NUMBER, AT(scene.atmosphere.aerosol_optical_depth), BETWEEN(0, 2)},
 	{"atmosphere", "ozone_du", FIELD_NUMBER, AT(scene.atmosphere.ozone_du), BETWEEN(0, 600)},

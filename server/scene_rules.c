@@ -73,20 +73,29 @@ static void resolve_dsd(struct scene_input *input, struct problem *problem)
 
 static void check_clouds(const struct scene_input *input, struct problem *problem)
 {
-	static const char *const procedural[] = {"type", "seed", "coverage", NULL};
+	static const char *const procedural[] = {"type", "seed", "coverage", NULL}, *const hash[] = {"map_hash", NULL};
 	if (given(input, "clouds", "map"))
 		refuse_given(input, "clouds", procedural, "does not go with a map", problem);
+	else
+		refuse_given(input, "clouds", hash, "goes with a map only", problem);
 }
 
 static void check_ground(struct scene_input *input, struct problem *problem)
 {
 	static const char *const albedo[] = {"albedo", NULL};
-	static const char *const procedural[] = {"type", "albedo", NULL};
+	static const char *const procedural[] = {"type", "albedo", NULL}, *const hash[] = {"map_hash", NULL};
 	struct scene_ground *ground = &input->scene.ground;
 	if (given(input, "ground", "map"))
 		refuse_given(input, "ground", procedural, "does not go with a map", problem);
+	else
+		refuse_given(input, "ground", hash, "goes with a map only", problem);
 	if (problem_mentions(problem, "/ground"))
 		return;
+	if (*ground->map.name) { /* a Lambertian ground whose reflectance the map says; what it reaches is checked with the map */
+		ground->type = GROUND_LAMBERT;
+		ground->albedo[0] = ground->albedo[1] = ground->albedo[2] = 0;
+		return;
+	}
 	if (ground->type != GROUND_LAMBERT) {
 		refuse_given(input, "ground", albedo, "goes with the type lambert only", problem);
 		/* One scene, one content: an unused albedo must not make two scenes of one. */

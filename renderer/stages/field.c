@@ -1,6 +1,7 @@
 #include "renderer/stages/field.h"
 
 #include "renderer/log.h"
+#include "renderer/scene_map.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -119,7 +120,7 @@ static void fill_block(struct scene_block *block, const struct scene_clouds *clo
 	block->cloud_detail[0] = (float)detail;
 	block->cloud_detail[1] = (float)wrap(turbulence_shear * east, detail);
 	block->cloud_detail[2] = (float)wrap(turbulence_shear * north, detail);
-	block->cloud_detail[3] = (float)shapes[clouds->type].detail_weight;
+	block->cloud_detail[3] = clouds->map.map ? 0 : (float)shapes[clouds->type].detail_weight;
 	block->cloud_threshold[3] = (float)clouds->resolution;
 }
 
@@ -159,8 +160,32 @@ static struct coarse_field *coarse_field_compute(const struct field_stage *stage
 	return field;
 }
 
+/* The field of a map: what the map says is thickness already, so there is neither detail nor anything to count. */
+static struct coarse_field *coarse_field_of_map(const struct scene_map *map, int resolution)
+{
+	struct coarse_field *field = calloc(1, sizeof *field);
+	float *texels = scene_map_texels(map, resolution), none = 0;
+	if (!field || !texels || !texture_init(&field->coarse, resolution, resolution, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS) ||
+	    !texture_init(&field->detail, 1, 1, TEXTURE_R32F, TEXTURE_REPEAT)) {
+		coarse_field_destroy(field);
+		free(texels);
+		return NULL;
+	}
+	texture_upload(&field->coarse, texels);
+	texture_upload(&field->detail, &none);
+	texture_build_mipmaps(&field->coarse);
+	free(texels);
+	return field;
+}
+
 static void add_field_inputs(struct cache_key *key, const struct scene_clouds *clouds)
 {
+	stage_key_add_map(key, clouds->map.map);
+	if (clouds->map.map) { /* which drifts as it is */
+		cache_key_add(key, clouds->tile_m);
+		cache_key_add(key, clouds->resolution);
+		return;
+	}
 	const double inputs[] = {clouds->type,       clouds->seed,        clouds->time_s,     clouds->tile_m,
 				 clouds->resolution, clouds->wind_mps[0], clouds->wind_mps[1]};
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
@@ -176,7 +201,8 @@ static const struct coarse_field *coarse_field_get(const struct field_stage *sta
 	if (field)
 		return field;
 	context->reused = false;
-	field = coarse_field_compute(stage, scene->clouds.resolution);
+	const struct scene_map *map = scene->clouds.map.map;
+	field = map ? coarse_field_of_map(map, scene->clouds.resolution) : coarse_field_compute(stage, scene->clouds.resolution);
 	if (!field ||
 	    !cache_keep(context->cache, &key, field, texture_bytes(&field->coarse) + texture_bytes(&field->detail), coarse_field_destroy))
 		return NULL;
@@ -201,6 +227,11 @@ static double quantile(const unsigned *histogram, double share)
 /* The threshold, from the densities as they are; under an overcast it sinks below them all, so that no hole is left. */
 static void fill_threshold(struct scene_block *block, const struct scene_clouds *clouds, const unsigned *histogram)
 {
+	if (clouds->map.map) { /* exponent 0: thickness already */
+		block->cloud_threshold[0] = block->cloud_threshold[2] = 0;
+		block->cloud_threshold[1] = 1;
+		return;
+	}
 	const double lowest = quantile(histogram, 0.0005), highest = quantile(histogram, 0.9995);
 	double threshold = quantile(histogram, 1 - clouds->coverage);
 	const double near_overcast = fmin(1, fmax(0, (clouds->coverage - 0.9) / 0.1));

@@ -44,8 +44,9 @@ float field_thickness_of(float density, float footprint)
 	float softness = 0.012 + 0.05 * (1.0 - exp(-footprint * (1.0 / 150.0)));
 	float x = excess / softness;
 	float soft = x > 20.0 ? excess : x < -12.0 ? 0.0 : softness * log(1.0 + exp(x));
-	// A thin skirt around a thick middle: edges are translucent over some 100 m.
-	return cloud_layer.y * min(pow(soft, cloud_threshold.z) * soft / (soft + FIELD_SKIRT), 1.0);
+	// A thin skirt around a thick middle: edges are translucent over some 100 m. A map says itself how thick its clouds are.
+	float share = pow(soft, cloud_threshold.z) * soft / (soft + FIELD_SKIRT);
+	return cloud_layer.y * clamp(cloud_threshold.z > 0.0 ? share : density, 0.0, 1.0);
 }
 
 float field_thickness(vec2 place, float footprint)

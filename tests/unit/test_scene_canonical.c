@@ -66,6 +66,8 @@ static json_t *random_value(const struct scene_field *field)
 		return json_string(field->choices[choice]);
 	case FIELD_INTEGER:
 		return json_real(field->flags & FIELD_POWER_OF_TWO ? field->range[0].high : floor(random_in(&field->range[0])));
+	case FIELD_ASSET:
+		return json_string("some-map_1.png");
 	case FIELD_SEED:
 		return json_real(floor(random_in(&field->range[0])));
 	case FIELD_NUMBER_OR_AUTO:
@@ -86,17 +88,27 @@ static bool is_out_of_place(const struct scene_field *field, bool panorama)
 	return panorama && name_index(of_perspectives, field->name) >= 0;
 }
 
+/* Whether a field is for scenes with a map, for those without, or for both. A hash is a query's no member, and so left out here. */
+static bool suits(const struct scene_field *field, bool map)
+{
+	static const char *const procedural[] = {"type", "seed", "coverage", "albedo", NULL};
+	const bool either = strcmp(field->section, "clouds") == 0 || strcmp(field->section, "ground") == 0;
+	if (field->type == FIELD_HASH)
+		return false;
+	return field->type == FIELD_ASSET ? map : !(map && either && name_index(procedural, field->name) >= 0);
+}
+
 /* A random scene that obeys the rules across members; the others are thrown away. */
 static bool random_scene(struct scene *scene)
 {
 	struct scene_input input = scene_input_default();
 	struct problem problem = {0};
-	const bool panorama = random_bits() & 1, by_time = random_bits() & 1;
+	const bool panorama = random_bits() & 1, map = random_bits() % 4 == 0, by_time = random_bits() & 1;
 	for (const struct scene_field *field = scene_fields; field->section; field++) {
 		const bool of_sun = strcmp(field->section, "sun") == 0,
 			   is_angle = strstr(field->name, "elevation") || strstr(field->name, "azimuth");
-		if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER) || (of_sun ? is_angle == by_time : random_bits() % 3 == 0) ||
-		    is_out_of_place(field, panorama))
+		const bool left_out = of_sun ? is_angle == by_time : random_bits() % 3 == 0;
+		if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER) || is_out_of_place(field, panorama) || !suits(field, map) || left_out)
 			continue;
 		json_t *value = random_value(field);
 		scene_json_read_field(field, value, "/x", &input, &problem);

@@ -216,14 +216,38 @@ static void test_later(void **state)
 	(void)state;
 	assert_later("{\"clouds\":{\"type\":\"altocumulus\"}}", "/clouds/type");
 	assert_later("{\"clouds\":{\"type\":\"cirrocumulus\"}}", "/clouds/type");
-	assert_later("{\"clouds\":{\"map\":\"a\"}}", "/clouds/map");
 	assert_later("{\"ground\":{\"type\":\"grass\"}}", "/ground/type");
 	assert_later("{\"ground\":{\"type\":\"soil\"}}", "/ground/type");
 	assert_later("{\"ground\":{\"type\":\"sand\"}}", "/ground/type");
-	assert_later("{\"ground\":{\"map\":\"a\"}}", "/ground/map");
 	assert_later("{\"model\":{\"name\":\"volume\"}}", "/model/name");
-	read("{\"clouds\":{\"map\":\"a\",\"seed\":3}}");
-	assert_true(problem_mentions(&problem, "/clouds/seed"));
+}
+
+static void test_maps(void **state)
+{
+	(void)state;
+	assert_valid("{\"clouds\":{\"map\":\"a.b-c_9\",\"map_hash\":\"0123456789abcdef0123456789abcdef\"},"
+		     "\"ground\":{\"map\":\"a\",\"albedo_scale\":2}}");
+	assert_string_equal(input.scene.clouds.map.name, "a.b-c_9");
+	assert_string_equal(input.scene.clouds.map.hash, "0123456789abcdef0123456789abcdef");
+	assert_string_equal(input.scene.ground.map.name, "a");
+	assert_int_equal(input.scene.ground.type, GROUND_LAMBERT);
+	static const char *const bad_names[] = {
+		"\"\"",   "\".a\"",  "\"a/b\"",
+		"\"..\"", "\"a b\"", "\"\u00e4\"",
+		"1",      "null",    "\"0123456789012345678901234567890123456789012345678901234567890123\""};
+	for (size_t i = 0; i < sizeof bad_names / sizeof *bad_names; i++) {
+		char body[128];
+		snprintf(body, sizeof body, "{\"clouds\":{\"map\":%s}}", bad_names[i]);
+		assert_refused(body, "/clouds/map");
+	}
+	assert_refused("{\"clouds\":{\"map\":\"a\",\"seed\":3}}", "/clouds/seed");
+	assert_refused("{\"clouds\":{\"map\":\"a\",\"type\":\"none\"}}", "/clouds/type");
+	assert_refused("{\"clouds\":{\"map\":\"a\",\"coverage\":0.5}}", "/clouds/coverage");
+	assert_refused("{\"clouds\":{\"map\":\"a\",\"map_hash\":\"0123\"}}", "/clouds/map_hash");
+	assert_refused("{\"clouds\":{\"map_hash\":\"0123456789abcdef0123456789abcdef\"}}", "/clouds/map_hash");
+	assert_refused("{\"ground\":{\"map\":\"a\",\"type\":\"lambert\"}}", "/ground/type");
+	assert_refused("{\"ground\":{\"map\":\"a\",\"albedo\":[0,0,0]}}", "/ground/albedo");
+	assert_refused("{\"ground\":{\"map_hash\":\"0123456789abcdef0123456789abcdef\"}}", "/ground/map_hash");
 }
 
 static void test_not_json(void **state)
@@ -309,10 +333,19 @@ static void test_presets(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_defaults),          cmocka_unit_test(test_members),     cmocka_unit_test(test_wrong_members),
-		cmocka_unit_test(test_repeated_and_huge), cmocka_unit_test(test_all_at_once), cmocka_unit_test(test_across_members),
-		cmocka_unit_test(test_panoramas),         cmocka_unit_test(test_sun_by_time), cmocka_unit_test(test_later),
-		cmocka_unit_test(test_not_json),          cmocka_unit_test(test_nesting),     cmocka_unit_test(test_bounds_of_a_problem),
+		cmocka_unit_test(test_defaults),
+		cmocka_unit_test(test_members),
+		cmocka_unit_test(test_wrong_members),
+		cmocka_unit_test(test_repeated_and_huge),
+		cmocka_unit_test(test_all_at_once),
+		cmocka_unit_test(test_across_members),
+		cmocka_unit_test(test_panoramas),
+		cmocka_unit_test(test_sun_by_time),
+		cmocka_unit_test(test_later),
+		cmocka_unit_test(test_maps),
+		cmocka_unit_test(test_not_json),
+		cmocka_unit_test(test_nesting),
+		cmocka_unit_test(test_bounds_of_a_problem),
 		cmocka_unit_test(test_presets),
 	};
 	return cmocka_run_group_tests_name("scene_json", tests, NULL, forget);

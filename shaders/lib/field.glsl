@@ -12,9 +12,15 @@ uniform sampler2D field_detail;
 // A tile of detail is this many times finer than the field, or the tile of detail, above it.
 const float FIELD_DETAIL_STEP = 8.0;
 
-float field_bicubic(sampler2D field, vec2 uv, float size, float lod)
+// octaves: by which a pixel is larger than a texel. Splines are for texels larger than pixels. They are read as level 0 alone, since their samples fit its
+// texels, and run together to one point as texels and pixels become equal; further levels are for smaller texels.
+float field_bicubic(sampler2D field, vec2 uv, float size, float octaves)
 {
 	bicubic_samples s = bicubic_at(uv, size);
+	float lod = max(octaves, 0.0);
+	float spread = clamp(-octaves, 0.0, 1.0);
+	s.near = mix(uv, s.near, spread);
+	s.far = mix(uv, s.far, spread);
 	float a = mix(textureLod(field, vec2(s.far.x, s.near.y), lod).x, textureLod(field, s.near, lod).x, s.share.x);
 	float b = mix(textureLod(field, s.far, lod).x, textureLod(field, vec2(s.near.x, s.far.y), lod).x, s.share.x);
 	return mix(b, a, s.share.y);
@@ -31,10 +37,7 @@ float field_density(vec2 place, float footprint)
 {
 	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
 	float octaves = field_octaves(footprint);
-	float lod = max(0.0, octaves);
-	// From the second level on, the spline would only blur what is already small: size of the level's texels.
-	float size = cloud_threshold.w * exp2(-floor(lod));
-	float density = field_bicubic(field_coarse, p / cloud_layer.z, size, lod);
+	float density = field_bicubic(field_coarse, p / cloud_layer.z, cloud_threshold.w, octaves);
 	// Detail lies elsewhere where the density is another, so that its repeat does not show.
 	vec2 uv = (p - vec2(cloud_detail.y, cloud_detail.z) + cloud_field.y * density * vec2(1.0, 0.6)) / cloud_detail.x;
 	float sum = textureLod(field_detail, uv, max(0.0, octaves + 3.0)).x;

@@ -112,12 +112,13 @@ float noise_living(uint hash, float whole, float fraction)
 }
 
 // Squared distances to the nearest and second nearest centre of cells. Each centre grows, shrinks and comes again elsewhere, one life after the other, and is
-// farther away from everything by up to 2, the most that counts, while it is weak. p in lattice cells, repeating after `period`; scatter: 0 on a lattice, 1 anywhere.
+// farther away from everything by up to 1 while it is weak. Neither is more than 1, beyond which centres may lie that were not looked at. p in lattice cells,
+// repeating after `period`; scatter: 0 on a lattice, 1 anywhere.
 vec2 noise_centres(vec2 p, int period, uint seed, float whole, float fraction, float scatter)
 {
 	vec2 cell = floor(p);
-	float first = 2.0;
-	float second = 2.0;
+	float first = 1.0;
+	float second = 1.0;
 	for (int dy = -1; dy <= 1; dy++) {
 		for (int dx = -1; dx <= 1; dx++) {
 			int x = int(cell.x) + dx;
@@ -127,7 +128,7 @@ vec2 noise_centres(vec2 p, int period, uint seed, float whole, float fraction, f
 			vec2 jitter = vec2(float(place & 0xffffu), float(place >> 16u)) * (1.0 / 65536.0) - 0.5;
 			vec2 away = vec2(float(x), float(y)) + 0.5 + scatter * jitter - p;
 			float weakness = 1.0 - smoothstep(0.0, 0.25, life.age) * (1.0 - smoothstep(0.75, 1.0, life.age));
-			float distance = dot(away, away) + 2.0 * weakness;
+			float distance = dot(away, away) + weakness;
 			second = min(second, max(first, distance));
 			first = min(first, distance);
 		}

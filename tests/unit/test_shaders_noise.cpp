@@ -172,9 +172,9 @@ static void cells_live_without_jumps(void **)
 			before = now;
 		}
 	}
-	assert_true(nearest < 0.01 && farthest <= 2);
-	/* A centre that weakens by 2 over a quarter of its life passes at most this much in a step. */
-	assert_true(jump < 2 * 1.5 * 0.002 / 0.25 * 1.1);
+	assert_true(nearest < 0.01 && farthest <= 1);
+	/* A centre that weakens by 1 over a quarter of its life passes at most this much in a step. */
+	assert_true(jump < 1.5 * 0.002 / 0.25 * 1.1);
 }
 
 /* Values at lattice points: mean 0, variance 1, whatever their age, and steady over the ends of lives. */

@@ -26,7 +26,7 @@ struct scene_block {
 	float cloud_field[4];         /* share of the range where edges are thin; shift of detail, m per density; tiles of detail; - */
 	float cloud_drift[4];         /* drift so far, m, modulo the tile: east, north; -; - */
 	float cloud_detail[4];        /* tile of the detail, m; its drift, m: east, north; weight */
-	float cloud_threshold[4];     /* field value where H begins; 1/(range above it); exponent of H; resolution of the field */
+	float cloud_threshold[4];     /* field value where H begins; 1/(range above it); roundness of H; resolution of the field */
 	float extinction[4];          /* kappa, 1/m; - */
 	float extinction_modified[4]; /* kappa_S, 1/m; - */
 	float extinction_scaled[4];   /* of what does not go straight on, 1/m: (1 - f) kappa when solved, else kappa_S; q of thick layers */

@@ -156,7 +156,7 @@ static double density_share(const struct field_noise_profile *profile, double th
 	double low = 0, high = 1;
 	for (int i = 0; i < 40; i++) {
 		const double middle = 0.5 * (low + high);
-		const double at = pow(middle, profile->exponent) * middle * (1 + profile->skirt) / (middle + profile->skirt);
+		const double at = (1 - pow(1 - middle, profile->roundness)) * middle * (1 + profile->skirt) / (middle + profile->skirt);
 		*(at < thickness ? &low : &high) = middle;
 	}
 	return high;
@@ -177,7 +177,7 @@ static void fill_threshold(struct scene_block *block, const struct scene_clouds 
 		threshold = density_highest;
 	block->cloud_threshold[0] = (float)threshold;
 	block->cloud_threshold[1] = (float)(1 / fmax(highest - threshold, 1e-3));
-	block->cloud_threshold[2] = (float)profile.exponent;
+	block->cloud_threshold[2] = (float)profile.roundness;
 }
 
 /* Level 0 from the heights, each further level from the one below it, read through a view of it alone: levels that are being written must

@@ -45,30 +45,30 @@ static const struct cloud_kind {
 	double fine;                          /* share of the turbulence that the detail has, below 1 where edges are soft */
 	double displacement;                  /* of detail, m per density */
 } kinds[CLOUD_TYPE_COUNT] = {
-	[CLOUD_STRATUS] = {.profile = {0.45, 0.10, 0.4},
+	[CLOUD_STRATUS] = {.profile = {3.0, 0.10, 0.4},
 			   .layers = {{2600, 4000, 900, 0, 0.25, 0.0, 0, 1.0}},
 			   .roll_length = 1700,
 			   .roll = 0.06,
 			   .open = -1,
-			   .meso = 0.4,
+			   .meso = 0.28,
 			   .outer = 2500,
 			   .turbulence = 0.32,
 			   .life = 1500,
-			   .fine = 0.6,
+			   .fine = 0.4,
 			   .displacement = 60},
-	[CLOUD_STRATOCUMULUS] = {.profile = {0.75, 0.08, 0.1},
-				 .layers = {{3600, 4000, 1100, 1, 0.0, 0.0, 0.8, 0.9},
+	[CLOUD_STRATOCUMULUS] = {.profile = {1.8, 0.08, 0.1},
+				 .layers = {{3600, 4000, 1100, 1, 0.0, 0.0, 1.2, 0.9},
 					    {1400, 2400, 500, -1, 0.6, 0.5, 0, 0.85},
 					    {560, 1100, 280, 0, 0.35, 0.15, 0, 0.9},
 					    {190, 700, 0, 0, 0.16, 0.06, 0, 0.95}},
-				 .open = 0.35,
-				 .meso = 0.22,
+				 .open = 0.38,
+				 .meso = 0.2,
 				 .outer = 1500,
 				 .turbulence = 0.27,
 				 .life = 1000,
 				 .fine = 0.5,
 				 .displacement = 60},
-	[CLOUD_ALTOCUMULUS] = {.profile = {0.55, 0.05, 0.1},
+	[CLOUD_ALTOCUMULUS] = {.profile = {1.8, 0.04, 0.03},
 			       .layers = {{1500, 2400, 600, 0, 0.25, 0.0, 0, 0.9},
 					  {420, 900, 200, 0, 0.7, 0.4, 0, 0.75},
 					  {170, 600, 0, 0, 0.25, 0.1, 0, 0.9}},
@@ -81,12 +81,12 @@ static const struct cloud_kind {
 			       .life = 1000,
 			       .fine = 0.7,
 			       .displacement = 50},
-	[CLOUD_CIRROCUMULUS] = {.profile = {0.45, 0.04, 0.1},
+	[CLOUD_CIRROCUMULUS] = {.profile = {1.8, 0.04, 0.03},
 				.layers = {{1300, 2400, 600, 0, 0.2, 0.0, 0, 0.9}, {140, 600, 60, 0, 0.45, 0.3, 0, 0.8}},
 				.roll_length = 300,
 				.roll = 0.2,
 				.open = -1,
-				.meso = 0.45,
+				.meso = 0.36,
 				.outer = 1000,
 				.turbulence = 0.22,
 				.life = 1000,
@@ -203,9 +203,9 @@ void field_noise_fill_block(struct scene_block *block, const struct scene_clouds
 /* Weights of the four slow sums: mesoscale variation, openness of the cells, and a smooth warp. */
 static void fill_slow(struct pass_run *run, const struct cloud_kind *kind, double coverage, double spacing, bool first)
 {
-	run->arguments[1][3] = first ? (float)((kind->open - coverage) / 0.3 + 0.5) : 0;
+	run->arguments[1][3] = first ? (float)((kind->open - coverage) / 0.25 + 0.5) : 0;
 	run->arguments[2][0] = (float)(kind->meso * octave_scale * (spacing < 600 ? 0 : cbrt(fmin(1, spacing / 2500))));
-	run->arguments[2][1] = (float)(0.7 * octave_scale * (spacing < 1200 ? 0 : 1));
+	run->arguments[2][1] = (float)(0.5 * octave_scale * (spacing < 1200 ? 0 : 1));
 	run->arguments[2][2] = run->arguments[2][3] = (float)(octave_scale * pow(fmin(1, spacing / 1250), 1.2));
 }
 

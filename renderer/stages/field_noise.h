@@ -16,7 +16,7 @@ struct field_noise {
 
 /* How density becomes thickness. */
 struct field_noise_profile {
-	double exponent;      /* of H over the density above its threshold */
+	double roundness;     /* n of H = 1 - (1 - x)^n of the density above its threshold, x 0..1 */
 	double skirt;         /* share of the range of densities over which clouds are thin at their edges */
 	double overcast_lift; /* share of the range by which the threshold sinks below all densities as coverage reaches 1 */
 };

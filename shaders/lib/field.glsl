@@ -63,7 +63,7 @@ float field_thickness_of(float density, float footprint)
 	float above = max(excess + softness, 0.0);
 	float soft = excess > softness ? excess : above * above / (4.0 * softness);
 	// A thin skirt around a thick middle: edges are translucent over some 100 m.
-	return cloud_layer.y * min(pow(soft, cloud_threshold.z) * soft * (1.0 + cloud_field.x) / (soft + cloud_field.x), 1.0);
+	return cloud_layer.y * min((1.0 - pow(max(1.0 - soft, 0.0), cloud_threshold.z)) * soft * (1.0 + cloud_field.x) / (soft + cloud_field.x), 1.0);
 }
 
 float field_thickness(vec2 place, float footprint)

@@ -23,7 +23,7 @@ struct scene_block {
 	float camera_forward[4];      /* unit; projection (enum projection) */
 	float image_size[4];          /* width, height, 1/width, 1/height */
 	float cloud_layer[4];         /* base, m; thickness (maximum of H), m; tile, m; 1 when there are clouds */
-	float cloud_field[4];         /* share of the range where edges are thin; shift of detail, m per density; tiles of detail; - */
+	float cloud_field[4];         /* share of the range where edges are thin; shift of detail, m a density; its tiles; billows, m */
 	float cloud_drift[4];         /* drift so far, m, modulo the tile: east, north; -; - */
 	float cloud_detail[4];        /* tile of the detail, m; its drift, m: east, north; weight */
 	float cloud_threshold[4];     /* field value where H begins; 1/(range above it); roundness of H; resolution of the field */

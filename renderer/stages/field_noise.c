@@ -44,6 +44,7 @@ static const struct cloud_kind {
 	double outer, turbulence, life;       /* of turbulence: outer length, weight, life at 1 km */
 	double fine;                          /* share of the turbulence that the detail has, below 1 where edges are soft */
 	double displacement;                  /* of detail, m per density */
+	double billow;                        /* height of its lumps on thick layers, m */
 } kinds[CLOUD_TYPE_COUNT] = {
 	[CLOUD_STRATUS] = {.profile = {3.0, 0.10, 0.4},
 			   .layers = {{2600, 4000, 900, 0, 0.25, 0.0, 0, 1.0}},
@@ -67,7 +68,8 @@ static const struct cloud_kind {
 				 .turbulence = 0.27,
 				 .life = 1000,
 				 .fine = 0.5,
-				 .displacement = 60},
+				 .displacement = 60,
+				 .billow = 9},
 	[CLOUD_ALTOCUMULUS] = {.profile = {1.8, 0.04, 0.03},
 			       .layers = {{1500, 2400, 600, 0, 0.25, 0.0, 0, 0.9},
 					  {420, 900, 200, 0, 0.7, 0.4, 0, 0.75},
@@ -191,7 +193,7 @@ void field_noise_fill_block(struct scene_block *block, const struct scene_clouds
 	block->cloud_field[0] = (float)kind->profile.skirt;
 	block->cloud_field[1] = (float)kind->displacement;
 	block->cloud_field[2] = (float)detail_count(clouds);
-	block->cloud_field[3] = 0;
+	block->cloud_field[3] = (float)kind->billow;
 	block->cloud_drift[0] = (float)wrap(east, tile);
 	block->cloud_drift[1] = (float)wrap(north, tile);
 	block->cloud_detail[0] = (float)detail;

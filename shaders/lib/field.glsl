@@ -32,14 +32,19 @@ float field_octaves(float footprint)
 	return log2(footprint * cloud_threshold.w / cloud_layer.z);
 }
 
+// Where detail is read at a place p in the drifting field: elsewhere where the density is another, so that its repeat does not show.
+vec2 field_detail_place(vec2 p, float density)
+{
+	return (p - vec2(cloud_detail.y, cloud_detail.z) + cloud_field.y * density * vec2(1.0, 0.6)) / cloud_detail.x;
+}
+
 // The field before its threshold. place: metres east and north of the tile's corner; footprint: size of the pixel there, m.
 float field_density(vec2 place, float footprint)
 {
 	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
 	float octaves = field_octaves(footprint);
 	float density = field_bicubic(field_coarse, p / cloud_layer.z, cloud_threshold.w, octaves);
-	// Detail lies elsewhere where the density is another, so that its repeat does not show.
-	vec2 uv = (p - vec2(cloud_detail.y, cloud_detail.z) + cloud_field.y * density * vec2(1.0, 0.6)) / cloud_detail.x;
+	vec2 uv = field_detail_place(p, density);
 	float sum = textureLod(field_detail, uv, max(0.0, octaves + 3.0)).x;
 	float weight = 0.5;
 	for (int i = 1; i < int(cloud_field.z); i++) {

@@ -42,7 +42,7 @@ static const struct cloud_kind {
 	double open;                          /* coverage below which half of the cells are open */
 	double meso;                          /* weight of variation over several km */
 	double outer, turbulence, life;       /* of turbulence: outer length, weight, life at 1 km */
-	double fine;                          /* share of the turbulence that the detail has, below 1 where edges are soft */
+	double fine;                          /* share of it that is left far below 40 m, less than 1 where edges are soft */
 	double displacement;                  /* of detail, m per density */
 	double billow;                        /* height of its lumps on thick layers, m */
 } kinds[CLOUD_TYPE_COUNT] = {
@@ -112,6 +112,7 @@ struct pyramid {
 	double life;     /* s, of a length of 1 km */
 	double scale;    /* amplitude at `outer` */
 	double outer;    /* m */
+	double fine;     /* share of the amplitude that is left far below 40 m */
 	int first, last; /* points a side of the first and the last octave */
 	enum texture_format format;
 };
@@ -158,10 +159,12 @@ static void fill_lives(float lives[2], double time, double life)
 	lives[1] = (float)(time / life - floor(time / life));
 }
 
-/* Amplitude of the octave of a spacing, relative to that of the outer length: none above it. */
-static double octave_weight(double spacing, double outer)
+/* Amplitude of the octave of a spacing, relative to that of the outer length: none above it. fine: share of it that is left far below 40 m.
+ */
+static double octave_weight(double spacing, double outer, double fine)
 {
-	return spacing > 1.5 * outer ? 0 : octave_scale * cbrt(fmin(1, spacing / outer));
+	const double x = spacing / 40;
+	return spacing > 1.5 * outer ? 0 : octave_scale * cbrt(fmin(1, spacing / outer)) * (fine + (1 - fine) * x * x / (1 + x * x));
 }
 
 static double detail_tile(const struct scene_clouds *clouds)
@@ -182,7 +185,7 @@ static int detail_count(const struct scene_clouds *clouds)
 static double detail_weight(const struct scene_clouds *clouds)
 {
 	const struct cloud_kind *kind = &kinds[clouds->type];
-	return kind->fine * kind->turbulence * octave_weight(detail_tile(clouds) / DETAIL_FIRST, kind->outer);
+	return kind->turbulence * octave_weight(detail_tile(clouds) / DETAIL_FIRST, kind->outer, kind->fine);
 }
 
 void field_noise_fill_block(struct scene_block *block, const struct scene_clouds *clouds)
@@ -216,7 +219,7 @@ static void fill_octave(struct pass_run *run, const struct pyramid *p, int side)
 	const double spacing = p->tile / side;
 	const uint32_t octave = (uint32_t)lrint(log2(side));
 	run->arguments[0][0] = (float)side;
-	run->arguments[0][1] = (float)(p->scale * octave_weight(spacing, p->outer));
+	run->arguments[0][1] = (float)(p->scale * octave_weight(spacing, p->outer, p->fine));
 	fill_lives(&run->arguments[0][2], p->clouds->time_s, p->life * pow(spacing / 1000, 2. / 3));
 	/* Lattices of different octaves lie askew, and slide. */
 	for (int i = 0; i < 2; i++) {
@@ -349,6 +352,7 @@ static bool coarse_run(const struct field_noise *noise, const struct scene_cloud
 			    .seed = clouds->seed ^ 0x5bd1e995u,
 			    .life = kind->life * meso_life,
 			    .outer = clouds->tile_m,
+			    .fine = 1,
 			    .first = LATTICE_FIRST,
 			    .last = side_for(clouds->tile_m / 320, clouds->resolution),
 			    .format = TEXTURE_RGBA32F};
@@ -360,6 +364,7 @@ static bool coarse_run(const struct field_noise *noise, const struct scene_cloud
 		p.life = kind->life;
 		p.scale = kind->turbulence;
 		p.outer = kind->outer;
+		p.fine = kind->fine;
 		p.last = clouds->resolution;
 		p.format = TEXTURE_R32F;
 		ok = pyramid_run(&p, &shape, coarse);
@@ -380,8 +385,10 @@ static void detail_cells_run(const struct field_noise *noise, const struct scene
 		tile /= 8;
 		weight /= 2;
 	}
+	/* Where several tiles of detail show the same cells, in several sizes, each does so the less. */
+	const double share = detail_count(clouds) > 1 ? 0.5 : 1;
 	struct pass_run run = {.targets = (struct texture *[]){target}, .samplers = {before, before}};
-	fill_layer(&run, clouds, i, cells_a_tile(tile, kind->layers[i].length), 1 / weight);
+	fill_layer(&run, clouds, i, cells_a_tile(tile, kind->layers[i].length), share / weight);
 	run.arguments[0][0] = run.arguments[0][3] = FIELD_DETAIL_SIDE;
 	pass_run(noise->passes[PASS_CELLS], &run);
 }
@@ -397,6 +404,7 @@ static bool detail_run(const struct field_noise *noise, const struct scene_cloud
 				  .life = kind->life,
 				  .scale = 1 / octave_scale, /* the block has the weight */
 				  .outer = tile / DETAIL_FIRST,
+				  .fine = 1,
 				  .first = DETAIL_FIRST,
 				  .last = FIELD_DETAIL_SIDE,
 				  .format = TEXTURE_R32F};

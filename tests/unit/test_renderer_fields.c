@@ -8,7 +8,8 @@ static const double extinction = 0.0368;
 
 static struct scene looking_up(enum cloud_type type, double coverage, uint32_t seed)
 {
-	static const double thickness[] = {[CLOUD_STRATUS] = 300, [CLOUD_STRATOCUMULUS] = 400, [CLOUD_ALTOCUMULUS] = 100, [CLOUD_CIRROCUMULUS] = 50};
+	static const double thickness[] = {
+		[CLOUD_STRATUS] = 300, [CLOUD_STRATOCUMULUS] = 400, [CLOUD_ALTOCUMULUS] = 100, [CLOUD_CIRROCUMULUS] = 50};
 	struct scene scene = small_scene(16, 16, LAYER(OPTICAL_THICKNESS));
 	scene.clouds.type = type;
 	scene.clouds.seed = seed;
@@ -144,7 +145,8 @@ static void thickness_is_the_maximum(void **state)
 				largest = fmaxf(largest, map[k]);
 			free(map);
 			const double share = largest / extinction / scene.clouds.thickness_m;
-			print_message("%s, coverage %.1f: largest H %.3f of thickness_m\n", scene_cloud_type_names[type], coverages[i], share);
+			print_message("%s, coverage %.1f: largest H %.3f of thickness_m\n", scene_cloud_type_names[type], coverages[i],
+				      share);
 			assert_true(share > 0.94 && share < 1.005);
 		}
 }
@@ -181,8 +183,8 @@ static void tiles_meet_without_a_seam(void **state)
 static const struct {
 	double tile, time;
 	int resolution, places, side;
-} grids[] = {{20000, 0, 512, 4, 128}, {20000, 9.9e6, 64, 4, 128}, {2000, 1234, 64, 1, 256}, {5000, 50, 512, 1, 256}, {20000, 0, 2048, 4, 128},
-	     {60000, 7e5, 1024, 8, 128}};
+} grids[] = {{20000, 0, 512, 4, 128}, {20000, 9.9e6, 64, 4, 128}, {2000, 1234, 64, 1, 256},
+	     {5000, 50, 512, 1, 256}, {20000, 0, 2048, 4, 128},   {60000, 7e5, 1024, 8, 128}};
 
 static void cover_is_what_was_asked_for(void **state)
 {
@@ -215,8 +217,8 @@ static void cover_is_what_was_asked_for(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(spectrum_is_that_of_cloud), cmocka_unit_test(other_spectra_fall),
-		cmocka_unit_test(thickness_is_the_maximum),  cmocka_unit_test(tiles_meet_without_a_seam),
+		cmocka_unit_test(spectrum_is_that_of_cloud),   cmocka_unit_test(other_spectra_fall),
+		cmocka_unit_test(thickness_is_the_maximum),    cmocka_unit_test(tiles_meet_without_a_seam),
 		cmocka_unit_test(cover_is_what_was_asked_for),
 	};
 	return RUN_WITH_RENDERER(tests);

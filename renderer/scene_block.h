@@ -24,10 +24,10 @@ struct scene_block {
 	float image_size[4];         /* width and height of the view; 1/width, 1/height */
 	float sun_disc_box[4];       /* box of weights: column, row, width, height; or of a large disc: 1/(share above the horizon) */
 	float cloud_layer[4];        /* base, m; thickness (maximum of H), m; tile, m; 1 when there are clouds */
-	float cloud_field[4];        /* seed (exact integer below 2^24 of a hash); coverage; time, s; type (enum cloud_type) */
-	float cloud_drift[4];        /* drift of the cells so far, m, modulo the tile: east, north; extra drift of the turbulence */
+	float cloud_field[4];        /* share of the range where edges are thin; shift of detail, m a density; its tiles; billows, m */
+	float cloud_drift[4];        /* drift so far, m, modulo the tile: east, north; -; - */
 	float cloud_detail[4];       /* tile of the detail, m; its drift, m: east, north; weight */
-	float cloud_threshold[4]; /* field value where H begins; 1/(range above it); exponent of H, 0: a map of H; resolution of the field
+	float cloud_threshold[4]; /* field value where H begins; 1/(range above it); roundness of H, 0: a map of H; resolution of the field
 				   */
 	float extinction[4];      /* kappa, 1/m; - */
 	float extinction_modified[4]; /* kappa_S, 1/m; - */

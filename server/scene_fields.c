@@ -20,8 +20,7 @@ const struct scene_field scene_fields[] = {
 	/* rn = re / (gamma + 2): the range of re is checked once both are known. */
 	{"dsd", "characteristic_radius_um", FIELD_NUMBER, AT(characteristic_radius_um), BETWEEN(0.045, 10), .flags = FIELD_INPUT_ONLY},
 
-	{"clouds", "type", FIELD_CHOICE, AT(scene.clouds.type), .choices = scene_cloud_type_names,
-	 .choices_later = LATER(CLOUD_ALTOCUMULUS) | LATER(CLOUD_CIRROCUMULUS)},
+	{"clouds", "type", FIELD_CHOICE, AT(scene.clouds.type), .choices = scene_cloud_type_names},
 	{"clouds", "seed", FIELD_SEED, AT(scene.clouds.seed), BETWEEN(0, UINT32_MAX)},
 	{"clouds", "time_s", FIELD_NUMBER, AT(scene.clouds.time_s), BETWEEN(0, 1e7)},
 	{"clouds", "coverage", FIELD_NUMBER, AT(scene.clouds.coverage), BETWEEN(0, 1)},

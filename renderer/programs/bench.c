@@ -38,6 +38,8 @@ static const struct setting settings[] = {
 	NUMBER("clouds.base_m", clouds.base_m),
 	NUMBER("clouds.thickness_m", clouds.thickness_m),
 	NUMBER("clouds.tile_m", clouds.tile_m),
+	NUMBER("clouds.wind_mps.0", clouds.wind_mps[0]),
+	NUMBER("clouds.wind_mps.1", clouds.wind_mps[1]),
 	WORD("ground.type", ground.type, scene_ground_type_names),
 	NUMBER("ground.albedo.0", ground.albedo[0]),
 	NUMBER("ground.albedo.1", ground.albedo[1]),
@@ -62,7 +64,7 @@ static void usage(FILE *to)
 {
 	fprintf(to, "usage: render-bench [-k KERNEL] [-s SHADER_DIR] [-p auto|fragment|compute] [-d DEVICE] [-n FRAMES] [-w WIDTH] [-h "
 		    "HEIGHT]\n"
-		    "                    [-S SEED] [-R] [-o FILE.ppm|FILE.pfm] [NAME=VALUE ...]\n"
+		    "                    [-S SEED] [-r RESOLUTION] [-R] [-o FILE.ppm|FILE.pfm] [NAME=VALUE ...]\n"
 		    "Renders the default scene with these changes and prints milliseconds per stage of the first frame, of a repeated one "
 		    "with the\n"
 		    "camera turned, and of one with another time. -R switches the radiosity off. NAME is a member as in JSON (camera.z_m "
@@ -149,7 +151,7 @@ int main(int argc, char **argv)
 	struct renderer_params params = {.device_index = -1};
 	struct scene scene = scene_default();
 	int frames = 3, width = 0, height = 0, option, status = 1;
-	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:Ro:")) != -1) {
+	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:r:Ro:")) != -1) {
 		switch (option) {
 		case 'k':
 			kernel_path = optarg;
@@ -174,6 +176,9 @@ int main(int argc, char **argv)
 			break;
 		case 'S':
 			scene.clouds.seed = (uint32_t)strtoul(optarg, NULL, 10);
+			break;
+		case 'r':
+			scene.clouds.resolution = atoi(optarg);
 			break;
 		case 'R':
 			scene.radiosity.enabled = false;

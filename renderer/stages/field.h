@@ -7,12 +7,14 @@
 #ifndef STRATUS_RENDERER_STAGES_FIELD_H
 #define STRATUS_RENDERER_STAGES_FIELD_H
 
+#include "renderer/stages/field_noise.h"
 #include "renderer/stages/stage.h"
 
-enum { FIELD_PASS_COUNT = 6 };
+enum { FIELD_PASS_COUNT = 4 };
 
 struct field_stage {
 	struct pass *passes[FIELD_PASS_COUNT];
+	struct field_noise noise;
 	unsigned histogram; /* OpenGL buffer */
 };
 

@@ -169,7 +169,7 @@ def test_line_and_column(daemon):
 def test_every_bad_member_at_once(daemon):
     answer = daemon.render(
         '{"sun": {"elevation_deg": 91, "azimuth_deg": "north"}, "moon": {}, "dsd": {"gamma": 1e999, "n0_per_cm3": 1, "n0_per_cm3": 2},'
-        '"clouds": {"type": "altocumulus", "wind_mps": [1, 2, 3]}, "camera": {"position_m": [0, 0, 1e5]},'
+        '"clouds": {"type": "nimbus", "wind_mps": [1, 2, 3]}, "camera": {"position_m": [0, 0, 1e5]},'
         '"ground": {"albedo": [1, 1, 1]}, "model": {"shading": "toon"}, "output": {"layers": ["sky"], "x/y": 0}}'
     )
     assert_problem(answer, 422, "invalid-scene")
@@ -218,7 +218,6 @@ def test_rules_across_members(daemon, scene, pointer):
 @pytest.mark.parametrize(
     "section, member, values",
     [
-        ("clouds", "type", ["altocumulus", "cirrocumulus"]),
         ("ground", "type", ["grass", "soil", "sand"]),
         ("model", "name", ["reference", "volume", "planar"]),
     ],

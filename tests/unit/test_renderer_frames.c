@@ -73,12 +73,12 @@ static void choose_projection(struct scene *scene)
 
 static struct scene random_scene(void)
 {
-	static const enum cloud_type types[] = {CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_NONE};
+	static const enum cloud_type types[] = {CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_ALTOCUMULUS, CLOUD_CIRROCUMULUS, CLOUD_NONE};
 	static const enum ground_type grounds[] = {GROUND_COUNTRY, GROUND_SEA, GROUND_SEA_ICE, GROUND_SNOW, GROUND_BLACK, GROUND_LAMBERT};
 	struct scene scene = small_scene(64, 48, (1u << LAYER_COUNT) - 1);
 	scene.sun = (struct scene_sun){.elevation_deg = uniform(-18, 90), .azimuth_deg = uniform(0, 360)};
 	scene.dsd = (struct scene_dsd){spread(1, 5000), spread(1, 20), spread(1, 30)};
-	scene.clouds.type = types[one_of(8) % 3];
+	scene.clouds.type = types[one_of(9) % 5];
 	scene.clouds.seed = (uint32_t)uniform(0, 4294967295.0);
 	scene.clouds.time_s = uniform(0, 1) < 0.5 ? 0 : spread(1, 1e7);
 	scene.clouds.coverage = one_of(4) == 0 ? one_of(2) : uniform(0, 1);

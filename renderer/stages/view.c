@@ -10,16 +10,17 @@
 
 /* OpenGL grants 16 samplers; each side leaves some out. */
 #define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "ground_relief"
-#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received", "smooth_table"
+#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received"
 
 static const struct {
 	const char *defines;
 	const char *samplers[PASS_SAMPLERS_MAX];
 } sides[VIEW_SIDES] = {
 	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
-	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS, CLOUD_SAMPLERS, "field_coarse", "field_detail"}},
+	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n",
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "smooth_table", "field_coarse", "field_detail"}},
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
-			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_table", "height_maximum"}},
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
 
@@ -47,7 +48,7 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
-	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
+	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL && height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
 			ok = pass_of(stage, &(struct view_variant){.side = side, .region = region, .shading = SHADING_SOLVED});
@@ -62,6 +63,7 @@ void view_stage_finish(struct view_stage *stage)
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	pass_destroy(stage->develop);
+	height_view_finish(&stage->height);
 	*stage = (struct view_stage){0};
 }
 
@@ -148,7 +150,7 @@ static enum view_side side_of(const struct scene *scene, const struct view_input
 }
 
 /* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
-static void bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
+static void bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in, const struct height_view *seen)
 {
 	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,     in->sky->to_layer,
 					  in->sky->to_end,        in->ground->map, in->ground->relief};
@@ -163,9 +165,9 @@ static void bind_inputs(struct pass_run *run, enum view_side side, const struct 
 					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  in->field->smooth,
-					  above ? in->field->height : in->field->coarse,
-					  above ? in->field->maximum : in->field->detail};
+					  above ? in->field->light : in->field->smooth,
+					  above ? &seen->place : in->field->coarse,
+					  above ? &seen->light : in->field->detail};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -248,12 +250,12 @@ static struct view_variant variant_of(const struct stage_context *context, const
 
 /* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. */
 static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-		      const enum layer *layers, int count, const struct texture **pictures)
+		      const struct height_view *seen, const enum layer *layers, int count, const struct texture **pictures)
 {
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
 	const struct view_variant variant = variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR);
-	bind_inputs(&run, variant.side, inputs);
+	bind_inputs(&run, variant.side, inputs, seen);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
 		targets[i] = picture_create(scene);
@@ -294,20 +296,22 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 			missing[missing_count++] = layers[i];
 		}
 	}
-	if (missing_count > 0)
-		context->reused = false;
-	for (int i = 0; i < missing_count;) {
-		if (cancelled && cancelled(cancel_context))
-			return false;
+	if (missing_count == 0)
+		return true;
+	context->reused = false;
+	struct height_view seen = {0};
+	bool ok = side_of(scene, inputs) != VIEW_ABOVE ||
+		  height_view_run(&stage->height, inputs->field, scene->output.width, scene->output.height, &seen);
+	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
-		if (!run_group(stage, context, scene, inputs, missing + i, group, made))
-			return false;
+		ok = !(cancelled && cancelled(cancel_context)) && run_group(stage, context, scene, inputs, &seen, missing + i, group, made);
 		for (int k = 0; k < group; k++)
 			pictures[place[i + k]] = made[k];
 		i += group;
 	}
-	return true;
+	height_view_release(&seen);
+	return ok;
 }
 
 void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)

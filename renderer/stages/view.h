@@ -5,6 +5,7 @@
 #ifndef STRATUS_RENDERER_STAGES_VIEW_H
 #define STRATUS_RENDERER_STAGES_VIEW_H
 
+#include "renderer/stages/height_view.h"
 #include "renderer/stages/radiosity.h"
 
 /* Layers that one run of the view pass makes. */
@@ -30,6 +31,7 @@ struct view_stage {
 	/* By shading, side, twilight, layers, region. Those that most pictures need are made at the start, the others with the first
 	 * picture that wants them. */
 	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS];
+	struct height_view_stage height;
 	struct pass *develop;
 };
 

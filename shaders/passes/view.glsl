@@ -2,6 +2,11 @@
 #include "shaders/lib/view.glsl"
 #include "shaders/lib/colour.glsl"
 
+#ifndef __cplusplus
+uniform sampler2D seen_place;
+uniform sampler2D seen_light;
+#endif
+
 vec3 view_layer(view_parts p, int layer)
 {
 	switch (layer) {
@@ -24,7 +29,11 @@ vec3 view_layer(view_parts p, int layer)
 
 void pass(ivec2 pixel)
 {
+#if VIEW_ABOVE
+	view_parts parts = view_ray(camera_ray(vec2(pixel) + 0.5), texelFetch(seen_place, pixel, 0), texelFetch(seen_light, pixel, 0));
+#else
 	view_parts parts = view_ray(camera_ray(vec2(pixel) + 0.5));
+#endif
 #if VIEW_COLOR_ONLY
 	STORE(0, vec4(colour_of_bands(view_sum(parts)), 1.0));
 #else

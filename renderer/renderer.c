@@ -246,6 +246,10 @@ static void fill_illuminance(struct job *job)
 	job->frame->global_illuminance_lux = job->frame->direct_illuminance_lux + job->frame->diffuse_illuminance_lux;
 }
 
+/* From above a layer is looked at that sends back half to three quarters of what it gets: as snow is, it is exposed for more than a grey
+ * mean, so that it comes out white. */
+static const double exposure_above_ev = 0.7;
+
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is
  * looked at. A white sheet in that light comes out at 0.5 before tone; most of a change of light is followed, as an eye does, but not all,
@@ -254,8 +258,9 @@ static double exposure_of(const struct scene *scene, const struct frame *frame, 
 {
 	if (!scene->output.exposure_auto)
 		return scene->output.exposure_ev;
+	const bool above = scene_has_clouds(scene) && scene->camera.position_m[2] >= scene->clouds.base_m;
 	const double lux = fmax(0.65 * frame->diffuse_illuminance_lux + 0.45 * frame->direct_illuminance_lux + 0.08 * beam_lux, 1e-2);
-	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000);
+	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) + (above ? exposure_above_ev : 0);
 }
 
 static int list_layers(const struct scene *scene, enum layer *layers)

@@ -9,7 +9,7 @@
 #include "renderer/stages/field.h"
 
 struct height_view_stage {
-	struct pass *start, *view;
+	struct pass *start, *view[2]; /* from afar, and near */
 };
 
 /* What shaders/passes/height_view.glsl stores. */
@@ -20,9 +20,9 @@ struct height_view {
 bool height_view_init(struct height_view_stage *stage, const struct pass_compiler *compiler);
 void height_view_finish(struct height_view_stage *stage);
 
-/* Renders `view` at a size in pixels; the caller hands it to height_view_release. Wants the whole block uploaded. false (and a log line)
+/* Renders `view` at the output's size; the caller hands it to height_view_release. Wants the whole block uploaded. false (and a log line)
  * when out of memory. */
-bool height_view_run(const struct height_view_stage *stage, const struct field_maps *field, int width, int height,
+bool height_view_run(const struct height_view_stage *stage, const struct scene *scene, const struct field_maps *field,
 		     struct height_view *view);
 void height_view_release(struct height_view *view);
 

@@ -301,7 +301,7 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	context->reused = false;
 	struct height_view seen = {0};
 	bool ok = side_of(scene, inputs) != VIEW_ABOVE ||
-		  height_view_run(&stage->height, inputs->field, scene->output.width, scene->output.height, &seen);
+		  height_view_run(&stage->height, scene, inputs->field, &seen);
 	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};

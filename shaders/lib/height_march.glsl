@@ -5,7 +5,7 @@
 // translucent as their chords are short; what is finer than a pixel covers a part of it.
 #ifndef SHADERS_LIB_HEIGHT_MARCH
 #define SHADERS_LIB_HEIGHT_MARCH
-#include "shaders/lib/height.glsl"
+#include "shaders/lib/height_detail.glsl"
 
 const int HEIGHT_ITERATIONS = 128;
 // What is left of the light behind is no longer looked at.
@@ -60,7 +60,7 @@ float height_block_start(vec3 direction, vec2 range, float radius)
 		float around = radius * (t + hop);
 		float lowest = min(height_of_ray(direction.z, t), height_of_ray(direction.z, t + hop)) - around;
 		bool wide = 0.25 * cell >= around;
-		if (wide && lowest > height_tap(origin + rate * (t + 0.5 * hop), level).y) {
+		if (wide && lowest > height_tap(origin + rate * (t + 0.5 * hop), level).y + HEIGHT_PUFF_TOP * HEIGHT_PUFF) {
 			t += hop;
 			level = min(level + 1.0, HEIGHT_LEVEL_MAX);
 		} else {
@@ -75,7 +75,7 @@ float height_block_start(vec3 direction, vec2 range, float radius)
 // What a ray meets: a first cloud and all that stands behind it.
 struct height_path {
 	float clear;   // share of the light from behind that comes through, 0..1
-	vec2 distance; // mean distance of what is seen of either, m
+	vec2 distance; // of either, m, a fraction of a mean free path inside its surface
 	vec2 weight;   // how much is seen of either; sum: 1 - clear
 };
 
@@ -95,6 +95,13 @@ float height_inside(float gap_before, float gap, float soft)
 	return clamp(0.5 - 0.5 * (gap_before + gap) / max(abs(gap - gap_before) + soft, 1e-3), 0.0, 1.0);
 }
 
+// Share of light that a step of some optical thickness scatters: 1 - exp(-depth), within a percent.
+float height_scattered(float depth)
+{
+	return 1.0 - 1.0 / (1.0 + depth * (1.0 + depth * (0.5 + depth * (1.0 / 6.0))));
+}
+
+// HEIGHT_NEAR: puffs are looked for.
 // range: where to look, m. pixel_angle: angle between pixels.
 height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 {
@@ -113,6 +120,9 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 	float before = -1.0; // where the last sample was; none
 	float gap_before = 0.0;
 	bool behind = false;
+	// Distances are means over the outermost droplets: further in, a ray through a crest would find the side behind.
+	float outer = 1.0;
+	vec2 outer_weight = vec2(0.0);
 	for (int i = 0; i < HEIGHT_ITERATIONS; i++) {
 		if (t > range.y || path.clear < HEIGHT_OPAQUE)
 			break;
@@ -123,30 +133,48 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 		float z = height_of_ray(direction.z, t);
 		float z_hop = height_of_ray(direction.z, t + hop);
 		vec2 tap = height_tap(origin + rate * (fine ? t : t + 0.5 * hop), level);
+#if HEIGHT_NEAR
+		float puff_depth = height_puff_depth(tap.x, t);
+		tap.y += HEIGHT_PUFF_TOP * puff_depth;
+#endif
 		if (!fine && min(z, z_hop) > tap.y) {
 			t += hop;
 			level = min(level + 1.0, HEIGHT_LEVEL_MAX);
 			cell = min(2.0 * cell, exp2(HEIGHT_LEVEL_MAX) * texel);
 			before = -1.0;
-			behind = path.weight.x > 0.0;
+			if (!behind && path.weight.x > 0.0) {
+				behind = true;
+				outer = 1.0;
+			}
 		} else if (!fine) {
 			level -= 1.0;
 			cell *= 0.5;
 		} else {
 			float gap = z - tap.x;
+			float stride = 0.7 * width + (gap > 0.0 ? 0.35 : -0.8) * gap;
+#if HEIGHT_NEAR
+			float finest = max(spread * t, 0.3 * texel);
+			gap -= puff_depth * height_puff((origin + rate * t) * cloud_layer.z + vec2(cloud_drift.x, cloud_drift.y), finest);
+			stride = mix(stride, 0.7 * finest + (gap > 0.0 ? 0.35 : -0.8) * gap, puff_depth / HEIGHT_PUFF);
+#endif
 			if (before >= 0.0) {
 				float length_m = t - before;
 				float soft = (tap.y - tap.x) * min(width / texel - 1.0, 1.0);
 				float inside = height_inside(gap_before, gap, soft);
-				float depth = extinction_scaled.y * length_m;
-				float seen = path.clear * inside * (1.0 - 1.0 / (1.0 + depth + 0.5 * depth * depth));
+				float seen = path.clear * inside * height_scattered(extinction_scaled.y * length_m);
+				float outermost = outer * inside * height_scattered(4.0 * extinction_scaled.y * length_m);
 				// Where in the step: at its end on the way in.
-				float middle = gap < gap_before ? t - 0.6 * inside * length_m : before + 0.4 * inside * length_m;
-				behind = behind || (path.weight.x > 0.02 && inside == 0.0);
+				float middle = gap < gap_before ? t - 0.75 * inside * length_m : before + 0.25 * inside * length_m;
+				if (!behind && path.weight.x > 0.02 && inside == 0.0) {
+					behind = true;
+					outer = 1.0;
+				}
 				vec2 to_which = behind ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 				path.weight += seen * to_which;
-				path.distance += seen * middle * to_which;
 				path.clear -= seen;
+				path.distance += outermost * middle * to_which;
+				outer_weight += outermost * to_which;
+				outer -= outermost;
 			}
 			if (gap > tap.y - tap.x + width) {
 				// Far above: larger cells again.
@@ -156,7 +184,6 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			before = t;
 			gap_before = gap;
 			// The last sample is at the end itself.
-			float stride = 0.7 * width + (gap > 0.0 ? 0.35 : -0.8) * gap;
 			t = t < range.y ? min(t + min(stride * slowness, longest), range.y) : range.y + 1.0;
 		}
 	}
@@ -164,10 +191,11 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 		// Out of steps, which happens far away along the tops: there is always another cloud.
 		vec2 to_which = path.weight.x > 0.02 ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 		path.weight += path.clear * to_which;
-		path.distance += path.clear * t * to_which;
+		path.distance += 1e-3 * t * to_which;
+		outer_weight += 1e-3 * to_which;
 		path.clear = 0.0;
 	}
-	path.distance /= max(path.weight, vec2(1e-6));
+	path.distance /= max(outer_weight, vec2(1e-12));
 	float kept = max(path.clear - HEIGHT_OPAQUE, 0.0) / (1.0 - HEIGHT_OPAQUE);
 	path.weight *= (1.0 - kept) / max(path.weight.x + path.weight.y, 1e-6);
 	path.clear = kept;

@@ -20,9 +20,21 @@ height_surface height_surface_at(vec3 direction, float t)
 	float height = height_at(place, footprint);
 	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
 	vec4 light = textureLod(height_light, uv, max(log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z), 0.0));
+	float received = light.w;
+#if HEIGHT_NEAR
+	float depth = height_puff_depth(height, t);
+	float reach = max(footprint, HEIGHT_PUFF_FINEST);
+	float puff = height_puff(place, reach);
+	vec2 slope = vec2(height_puff(place + vec2(reach, 0.0), reach), height_puff(place + vec2(0.0, reach), reach)) - puff;
+	slope *= depth / reach;
+	light += vec4(slope, 0.0, 0.0);
+	// Of the light that is scattered often, creases get less, and slopes as they face the sun.
+	float facing = 1.0 - 0.3 * dot(slope, height_sun_heading()) / max(height_sun_rise(), 0.3);
+	received *= clamp(facing, 0.6, 1.5) * (1.0 + 0.25 * puff * depth / HEIGHT_PUFF);
+#endif
 	height_surface at;
 	at.place = vec4(t, 0.0, height, height_smooth(place, footprint));
-	at.light = vec4(light.x, light.y, height_sunlit(height, light.z), light.w);
+	at.light = vec4(light.x, light.y, height_sunlit(height, light.z), received);
 	return at;
 }
 

@@ -65,12 +65,14 @@ namespace above
 #include "shaders/passes/view.glsl"
 } // namespace above
 #include "tests/unit/glsl_again.h"
+#define HEIGHT_NEAR 1
 namespace height_start_pass
 {
 #include "shaders/passes/height_start.glsl"
 } // namespace height_start_pass
+namespace height_start_pass
 #include "tests/unit/glsl_again.h"
-namespace height_view_pass
+	namespace height_view_pass
 {
 #include "shaders/passes/height_view.glsl"
 } // namespace height_view_pass

@@ -24,11 +24,10 @@ static const struct {
 };
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
 
-static struct pass *create_pass(const struct pass_compiler *compiler, const struct view_variant *variant)
+struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
 	char defines[256];
-	const int outputs = variant->layers ? VIEW_OUTPUTS : 1;
-	struct pass_desc desc = {.file = "shaders/passes/view.glsl", .defines = defines, .outputs = outputs};
+	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n",
 		 sides[variant->side].defines, variant->region, variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers);
@@ -41,7 +40,7 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 {
 	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region];
 	if (!*pass)
-		*pass = create_pass(&stage->compiler, variant);
+		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
 }
 
@@ -115,7 +114,8 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 				 camera->elevation_deg,
 				 camera->roll_deg,
 				 camera->vertical_fov_deg,
-				 camera->projection};
+				 camera->projection,
+				 scene->model.paths};
 	struct cache_key key = cache_key_make("view");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
@@ -150,7 +150,7 @@ static enum view_side side_of(const struct scene *scene, const struct view_input
 }
 
 /* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
-static void bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in, const struct height_view *seen)
+void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
 {
 	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,     in->sky->to_layer,
 					  in->sky->to_end,        in->ground->map, in->ground->relief};
@@ -166,8 +166,8 @@ static void bind_inputs(struct pass_run *run, enum view_side side, const struct 
 					  in->light->ground_received,
 					  in->light->cloud_received,
 					  above ? in->field->light : in->field->smooth,
-					  above ? &seen->place : in->field->coarse,
-					  above ? &seen->light : in->field->detail};
+					  above ? (in->seen ? &in->seen->place : NULL) : in->field->coarse,
+					  above ? (in->seen ? &in->seen->light : NULL) : in->field->detail};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -238,8 +238,8 @@ static bool run_whole(struct view_stage *stage, struct view_variant variant, con
 }
 
 /* A clear sky has neither shading nor a layer to be lit from below. */
-static struct view_variant variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-				      bool layers)
+struct view_variant view_variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+				    bool layers)
 {
 	const enum view_side side = side_of(scene, inputs);
 	if (side == VIEW_CLEAR)
@@ -250,12 +250,15 @@ static struct view_variant variant_of(const struct stage_context *context, const
 
 /* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. */
 static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-		      const struct height_view *seen, const enum layer *layers, int count, const struct texture **pictures)
+		      const enum layer *layers, int count, const struct texture **pictures)
 {
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const struct view_variant variant = variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR);
-	bind_inputs(&run, variant.side, inputs, seen);
+	const bool some_paths = scene->model.paths != SCENE_PATHS_ALL;
+	const struct view_variant variant = view_variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR || some_paths);
+	for (int i = 0; i <= LAYER_AIR - LAYER_SUN_DIRECT; i++)
+		run.arguments[1 + i / 4][i % 4] = (float)(scene->model.paths >> i & 1);
+	view_bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
 		targets[i] = picture_create(scene);
@@ -300,12 +303,13 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 		return true;
 	context->reused = false;
 	struct height_view seen = {0};
-	bool ok = side_of(scene, inputs) != VIEW_ABOVE ||
-		  height_view_run(&stage->height, scene, inputs->field, &seen);
+	struct view_inputs with_seen = *inputs;
+	with_seen.seen = &seen;
+	bool ok = side_of(scene, inputs) != VIEW_ABOVE || height_view_run(&stage->height, scene, inputs->field, &seen);
 	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
-		ok = !(cancelled && cancelled(cancel_context)) && run_group(stage, context, scene, inputs, &seen, missing + i, group, made);
+		ok = !(cancelled && cancelled(cancel_context)) && run_group(stage, context, scene, &with_seen, missing + i, group, made);
 		for (int k = 0; k < group; k++)
 			pictures[place[i + k]] = made[k];
 		i += group;

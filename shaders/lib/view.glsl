@@ -359,9 +359,9 @@ void view_add_sky(vec3 direction, vec2 air, INOUT(view_parts) parts)
 
 // The whole picture. Decided when the shader is built, since software renderers execute both sides of every branch:
 // VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_SOLVED: shading; VIEW_TWILIGHT: the sun lights the base somewhere; VIEW_COLOR_ONLY: parts are not asked for; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
+// place, light: what a ray from above sees of the layer, as shaders/passes/height_view.glsl stores it; place.x = 0: nothing.
 #if VIEW_ABOVE
-// place, light: as shaders/passes/height_view.glsl stores them.
-view_parts view_ray(vec3 direction, vec4 place, vec4 light)
+view_parts view_ray_seen(vec3 direction, vec4 place, vec4 light)
 #else
 view_parts view_ray(vec3 direction)
 #endif
@@ -391,6 +391,14 @@ view_parts view_ray(vec3 direction)
 	}
 	return parts;
 }
+
+#if VIEW_ABOVE
+// Of a ray that does not meet the layer.
+view_parts view_ray(vec3 direction)
+{
+	return view_ray_seen(direction, vec4(0.0), vec4(0.0));
+}
+#endif
 
 vec3 view_sum(view_parts p)
 {

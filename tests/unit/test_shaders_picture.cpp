@@ -70,9 +70,8 @@ namespace height_start_pass
 {
 #include "shaders/passes/height_start.glsl"
 } // namespace height_start_pass
-namespace height_start_pass
 #include "tests/unit/glsl_again.h"
-	namespace height_view_pass
+namespace height_view_pass
 {
 #include "shaders/passes/height_view.glsl"
 } // namespace height_view_pass
@@ -197,7 +196,8 @@ static view_inputs inputs_of(const scene &scene, const made &out)
 		out.slab_slices,
 		&out.sky,
 		&out.field,
-		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light};
+		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light,
+		nullptr};
 }
 
 static picture render_gpu(const scene &scene, made &out)
@@ -304,6 +304,8 @@ static picture render_cpu(int variant, const made &out)
 	glsl::set_scene_block(shared.context.block);
 	if (out.field.light)
 		look_at_heights();
+	/* All paths are shown. */
+	glsl::arguments[1] = glsl::arguments[2] = glsl::arguments[3] = glsl::vec4(1.0f);
 	for (int i = 0; i < LAYERS; i++) {
 		glsl::arguments[0].x = (float)layers[i];
 		for (int y = 0; y < HEIGHT; y++)

@@ -255,7 +255,7 @@ static struct scene_light scene_light_of(const struct job *job)
 
 /* From above a layer is looked at that sends back half to three quarters of what it gets: as snow is, it is exposed for more than a grey
  * mean, so that it comes out white. */
-static const double exposure_above_ev = 0.7;
+static const double exposure_above_ev = 0.5;
 
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is

@@ -18,7 +18,7 @@ static const struct pass_desc view_descs[] = {
 /* Pixels a side of the blocks, as in shaders/lib/height_march.glsl. */
 enum { BLOCK = 8 };
 /* Distance within which there are puffs, m, as in shaders/lib/height_detail.glsl. */
-static const double near_m = 2500;
+static const double near_m = 1500;
 
 bool height_view_init(struct height_view_stage *stage, const struct pass_compiler *compiler)
 {

@@ -9,7 +9,7 @@ uniform sampler2D field_detail; // turbulence in standard deviations
 
 // Of a thick cloud, m; nothing is left of them beyond the second distance, where the field's texels are pixels.
 const float HEIGHT_PUFF = 22.0;
-const vec2 HEIGHT_PUFF_DISTANCES = vec2(500.0, 2500.0);
+const vec2 HEIGHT_PUFF_DISTANCES = vec2(400.0, 1500.0);
 // Largest height of a puff over its mean, relative to HEIGHT_PUFF.
 const float HEIGHT_PUFF_TOP = 0.9;
 // The turbulence's picture is used this much smaller than below the layer, and nothing of it that is finer than light sees in droplets, m.

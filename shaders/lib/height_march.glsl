@@ -153,9 +153,11 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			float gap = z - tap.x;
 			float stride = 0.7 * width + (gap > 0.0 ? 0.35 : -0.8) * gap;
 #if HEIGHT_NEAR
-			float finest = max(spread * t, 0.3 * texel);
-			gap -= puff_depth * height_puff((origin + rate * t) * cloud_layer.z + vec2(cloud_drift.x, cloud_drift.y), finest);
-			stride = mix(stride, 0.7 * finest + (gap > 0.0 ? 0.35 : -0.8) * gap, puff_depth / HEIGHT_PUFF);
+			if (puff_depth > 0.0) {
+				float finest = max(spread * t, 0.3 * texel);
+				gap -= puff_depth * height_puff((origin + rate * t) * cloud_layer.z + vec2(cloud_drift.x, cloud_drift.y), finest);
+				stride = mix(stride, 0.7 * finest + (gap > 0.0 ? 0.35 : -0.8) * gap, puff_depth / HEIGHT_PUFF);
+			}
 #endif
 			if (before >= 0.0) {
 				float length_m = t - before;

@@ -23,14 +23,16 @@ height_surface height_surface_at(vec3 direction, float t)
 	float received = light.w;
 #if HEIGHT_NEAR
 	float depth = height_puff_depth(height, t);
-	float reach = max(footprint, HEIGHT_PUFF_FINEST);
-	float puff = height_puff(place, reach);
-	vec2 slope = vec2(height_puff(place + vec2(reach, 0.0), reach), height_puff(place + vec2(0.0, reach), reach)) - puff;
-	slope *= depth / reach;
-	light += vec4(slope, 0.0, 0.0);
-	// Of the light that is scattered often, creases get less, and slopes as they face the sun.
-	float facing = 1.0 - 0.3 * dot(slope, height_sun_heading()) / max(height_sun_rise(), 0.3);
-	received *= clamp(facing, 0.6, 1.5) * (1.0 + 0.25 * puff * depth / HEIGHT_PUFF);
+	if (depth > 0.0) {
+		float reach = max(footprint, HEIGHT_PUFF_FINEST);
+		float puff = height_puff(place, reach);
+		vec2 slope = vec2(height_puff(place + vec2(reach, 0.0), reach), height_puff(place + vec2(0.0, reach), reach)) - puff;
+		slope *= depth / reach;
+		light += vec4(slope, 0.0, 0.0);
+		// Of the light that is scattered often, creases get less, and slopes as they face the sun.
+		float facing = 1.0 - 0.3 * dot(slope, height_sun_heading()) / max(height_sun_rise(), 0.3);
+		received *= clamp(facing, 0.6, 1.5) * (1.0 + 0.25 * puff * depth / HEIGHT_PUFF);
+	}
 #endif
 	height_surface at;
 	at.place = vec4(t, 0.0, height, height_smooth(place, footprint));

@@ -3,7 +3,9 @@
  *
  * Depends on the height field, the sun's direction and the droplets' extinction. Shadows are found by doubling: what they reach over twice
  * a distance is the higher of two reaches of half of it. The light that is scattered often spreads sideways before it comes out again; its
- * mean over the tile is that of the beams which the layer holds up, so that slopes share the light out and make none.
+ * mean over the tile is that of the beams which the layer holds up, so that slopes share the light out and make none: a closed deck
+ * receives what a plane does. A low sun lights the sides of broken cloud and leaves other parts in shade (Varnai and Davies 1999, J. Atmos.
+ * Sci., on the horizontal transport effect), so that it catches more than its columns would.
  */
 #ifndef STRATUS_RENDERER_STAGES_HEIGHT_LIGHT_H
 #define STRATUS_RENDERER_STAGES_HEIGHT_LIGHT_H

@@ -266,6 +266,10 @@ static struct scene_light scene_light_of(const struct job *job)
 		.direct = colour_luminance(direct), .diffuse = colour_luminance(diffuse), .beam = colour_luminance(job->sky.sun_cloud)};
 }
 
+/* From above a layer is looked at that sends back half to three quarters of what it gets: as snow is, it is exposed for more than a grey
+ * mean, so that it comes out white. */
+static const double exposure_above_ev = 0.5;
+
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is
  * looked at. A white sheet in that light comes out at 0.5 before tone; most of a change of light is followed, as an eye does, but not all,
@@ -274,9 +278,10 @@ static double exposure_of(const struct job *job)
 {
 	if (!job->scene->output.exposure_auto)
 		return job->scene->output.exposure_ev;
+	const bool above = scene_has_clouds(job->scene) && job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
 	const struct scene_light light = scene_light_of(job);
 	const double lux = fmax(0.65 * light.diffuse + 0.45 * light.direct + 0.08 * light.beam, 1e-2);
-	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000);
+	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) + (above ? exposure_above_ev : 0);
 }
 
 /* For files of scene light alone: nothing else can hold the figures. */

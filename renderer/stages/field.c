@@ -7,12 +7,12 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { PASS_HISTOGRAM, PASS_HEIGHT, PASS_MAXIMUM, PASS_SMOOTH };
+enum { PASS_HISTOGRAM, PASS_HEIGHT, PASS_LEVELS, PASS_SMOOTH };
 
 static const struct pass_desc pass_descs[FIELD_PASS_COUNT] = {
 	[PASS_HISTOGRAM] = {.file = "shaders/passes/field_histogram.glsl", .outputs = 0, .samplers = {"field_coarse", "field_detail"}},
 	[PASS_HEIGHT] = {.file = "shaders/passes/height_base.glsl", .outputs = 1, .samplers = {"field_coarse", "field_detail"}},
-	[PASS_MAXIMUM] = {.file = "shaders/passes/height_maximum.glsl", .outputs = 1, .samplers = {"height_below"}},
+	[PASS_LEVELS] = {.file = "shaders/passes/height_levels.glsl", .outputs = 1, .samplers = {"height_below"}},
 	[PASS_SMOOTH] = {.file = "shaders/passes/height_smooth.glsl", .outputs = 1, .samplers = {"thickness"}},
 };
 
@@ -38,23 +38,18 @@ static void coarse_field_destroy(void *value)
 	free(field);
 }
 
-struct height_field {
-	struct texture height, maximum;
-};
-
-static void height_field_destroy(void *value)
+static void texture_destroy(void *value)
 {
-	struct height_field *field = value;
-	if (!field)
-		return;
-	texture_finish(&field->maximum);
-	texture_finish(&field->height);
-	free(field);
+	struct texture *texture = value;
+	if (texture)
+		texture_finish(texture);
+	free(texture);
 }
 
 bool field_stage_init(struct field_stage *stage, const struct pass_compiler *compiler)
 {
-	if (!stage_create_passes(compiler, pass_descs, stage->passes, FIELD_PASS_COUNT) || !field_noise_init(&stage->noise, compiler))
+	if (!stage_create_passes(compiler, pass_descs, stage->passes, FIELD_PASS_COUNT) || !field_noise_init(&stage->noise, compiler) ||
+	    !height_light_init(&stage->light, compiler))
 		return false;
 	glCreateBuffers(1, &stage->histogram);
 	glNamedBufferStorage(stage->histogram, HISTOGRAM_BINS * sizeof(unsigned), NULL, 0);
@@ -66,6 +61,7 @@ void field_stage_finish(struct field_stage *stage)
 	if (stage->histogram)
 		glDeleteBuffers(1, &stage->histogram);
 	stage->histogram = 0;
+	height_light_finish(&stage->light);
 	field_noise_finish(&stage->noise);
 	stage_destroy_passes(stage->passes, FIELD_PASS_COUNT);
 }
@@ -213,19 +209,6 @@ static void fill_threshold(struct scene_block *block, const struct scene_clouds 
 	block->cloud_threshold[2] = (float)profile.roundness;
 }
 
-/* Level 0 from the heights, each further level from the one below it, read through a view of it alone: levels that are being written must
- * not be within a sampler's reach. */
-static void maximum_level(const struct field_stage *stage, struct height_field *field, int level)
-{
-	struct texture below = level == 0 ? field->height : texture_level(&field->maximum, level - 1);
-	pass_run(stage->passes[PASS_MAXIMUM], &(struct pass_run){.targets = (struct texture *[]){&field->maximum},
-								 .level = level,
-								 .samplers = {&below},
-								 .arguments = {{(float)(HEIGHT_SIDE >> level), level == 0 ? 1 : 0}}});
-	if (level > 0)
-		texture_finish(&below);
-}
-
 /* The thickness over the tile, `side` texels a side, with its means. */
 static bool height_compute(const struct field_stage *stage, const struct coarse_field *coarse, int side, struct texture *height)
 {
@@ -238,19 +221,33 @@ static bool height_compute(const struct field_stage *stage, const struct coarse_
 	return true;
 }
 
-static struct height_field *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse)
+/* Level 0 from the heights, each further level from the one below it, read through a view of it alone: levels that are being written must
+ * not be within a sampler's reach. */
+static void build_levels(const struct field_stage *stage, const struct texture *heights, struct texture *field)
 {
-	struct height_field *field = calloc(1, sizeof *field);
-	if (!field)
-		return NULL;
-	if (!height_compute(stage, coarse, HEIGHT_SIDE, &field->height) ||
-	    !texture_init(&field->maximum, HEIGHT_SIDE / 2, HEIGHT_SIDE / 2, TEXTURE_R32F,
-			  TEXTURE_REPEAT | TEXTURE_NEAREST | TEXTURE_MIPMAPS)) {
-		height_field_destroy(field);
+	for (int level = 0; level < field->levels; level++) {
+		struct texture below = level == 0 ? *heights : texture_level(field, level - 1);
+		const int size = level == 0 ? HEIGHT_SIDE : HEIGHT_SIDE >> (level - 1);
+		pass_run(stage->passes[PASS_LEVELS], &(struct pass_run){.targets = (struct texture *[]){field},
+									.level = level,
+									.samplers = {&below},
+									.arguments = {{(float)size, level == 0}}});
+		if (level > 0)
+			texture_finish(&below);
+	}
+}
+
+static struct texture *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse)
+{
+	struct texture heights = {0}, *field = calloc(1, sizeof *field);
+	if (!field || !height_compute(stage, coarse, HEIGHT_SIDE, &heights) ||
+	    !texture_init(field, HEIGHT_SIDE, HEIGHT_SIDE, TEXTURE_RG16, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
+		texture_finish(&heights);
+		texture_destroy(field);
 		return NULL;
 	}
-	for (int level = 0; level < field->maximum.levels; level++)
-		maximum_level(stage, field, level);
+	build_levels(stage, &heights, field);
+	texture_finish(&heights);
 	return field;
 }
 
@@ -262,17 +259,16 @@ static struct cache_key thickness_key(const char *name, const struct scene_cloud
 	return key;
 }
 
-static const struct height_field *height_field_get(const struct field_stage *stage, struct stage_context *context,
-						   const struct scene *scene, const struct coarse_field *coarse)
+static const struct texture *height_field_get(const struct field_stage *stage, struct stage_context *context, const struct scene *scene,
+					      const struct coarse_field *coarse)
 {
 	const struct cache_key key = thickness_key("height", &scene->clouds);
-	struct height_field *field = cache_find(context->cache, &key);
+	struct texture *field = cache_find(context->cache, &key);
 	if (field)
 		return field;
 	context->reused = false;
 	field = height_field_compute(stage, coarse);
-	if (!field ||
-	    !cache_keep(context->cache, &key, field, texture_bytes(&field->height) + texture_bytes(&field->maximum), height_field_destroy))
+	if (!field || !cache_keep(context->cache, &key, field, texture_bytes(field), texture_destroy))
 		return NULL;
 	return field;
 }
@@ -333,12 +329,9 @@ static bool thickness_get(const struct field_stage *stage, struct stage_context 
 	maps->smooth = &thickness->smooth;
 	if (!from_above)
 		return true;
-	const struct height_field *height = height_field_get(stage, context, scene, coarse);
-	if (!height)
-		return false;
-	maps->height = &height->height;
-	maps->maximum = &height->maximum;
-	return true;
+	maps->height = height_field_get(stage, context, scene, coarse);
+	maps->light = maps->height ? height_light_get(&stage->light, context, scene, maps->height) : NULL;
+	return maps->light;
 }
 
 bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, bool from_above,

@@ -10,16 +10,17 @@
 
 /* OpenGL grants 16 samplers; each side leaves some out. */
 #define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "ground_relief"
-#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received", "smooth_table"
+#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received"
 
 static const struct {
 	const char *defines;
 	const char *samplers[PASS_SAMPLERS_MAX];
 } sides[VIEW_SIDES] = {
 	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
-	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS, CLOUD_SAMPLERS, "field_coarse", "field_detail"}},
+	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n",
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "smooth_table", "field_coarse", "field_detail"}},
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
-			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_table", "height_maximum"}},
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
 
@@ -49,7 +50,7 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
-	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
+	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL && height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
 			ok = pass_of(stage, &(struct view_variant){.side = side, .region = region, .shading = SHADING_SOLVED});
@@ -65,6 +66,7 @@ void view_stage_finish(struct view_stage *stage)
 		pass_destroy(passes[i]);
 	pass_destroy(stage->develop);
 	disc_buffer_finish(&stage->disc);
+	height_view_finish(&stage->height);
 	*stage = (struct view_stage){0};
 }
 
@@ -164,9 +166,9 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  in->field->smooth,
-					  above ? in->field->height : in->field->coarse,
-					  above ? in->field->maximum : in->field->detail};
+					  above ? in->field->light : in->field->smooth,
+					  above ? (in->seen ? &in->seen->place : NULL) : in->field->coarse,
+					  above ? (in->seen ? &in->seen->light : NULL) : in->field->detail};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -309,6 +311,20 @@ fail:
 	return false;
 }
 
+/* What the picture sees of the layer below the camera, one view after the other. */
+static bool see_layer(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct field_maps *field,
+		      struct height_view *seen)
+{
+	bool ok = height_view_create(scene, seen);
+	for (int i = 0; ok && i < camera_view_count(scene); i++) {
+		const struct camera_view view = camera_view_of(scene, i);
+		fill_camera(&context->block, scene, &view);
+		stage_upload_block(context);
+		ok = height_view_run(&stage->height, scene, &view, field, seen);
+	}
+	return ok;
+}
+
 bool view_stage_run(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
 		    const enum layer *layers, int count, renderer_cancelled *cancelled, void *cancel_context,
 		    const struct texture **pictures)
@@ -323,23 +339,24 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 			missing[missing_count++] = layers[i];
 		}
 	}
-	if (missing_count > 0) {
-		context->reused = false;
-		if (!disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0)))
-			return false;
-	}
-	for (int i = 0; i < missing_count;) {
-		if (cancelled && cancelled(cancel_context))
-			return false;
+	if (missing_count == 0)
+		return true;
+	context->reused = false;
+	struct height_view seen = {0};
+	struct view_inputs with_seen = *inputs;
+	with_seen.seen = &seen;
+	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0)) &&
+		  (side_of(scene, inputs) != VIEW_ABOVE || see_layer(stage, context, scene, inputs->field, &seen));
+	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
-		if (!run_group(stage, context, scene, inputs, missing + i, group, made))
-			return false;
+		ok = !(cancelled && cancelled(cancel_context)) && run_group(stage, context, scene, &with_seen, missing + i, group, made);
 		for (int k = 0; k < group; k++)
 			pictures[place[i + k]] = made[k];
 		i += group;
 	}
-	return true;
+	height_view_release(&seen);
+	return ok;
 }
 
 void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)

@@ -6,6 +6,7 @@
 #define STRATUS_RENDERER_STAGES_VIEW_H
 
 #include "renderer/stages/disc.h"
+#include "renderer/stages/height_view.h"
 #include "renderer/stages/radiosity.h"
 
 /* Layers that one run of the view pass makes. */
@@ -33,6 +34,7 @@ struct view_stage {
 	/* By shading, side, twilight, layers, region, projection, large sun. Those that most pictures need are made at the start, the
 	 * others with the first picture that wants them. */
 	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2];
+	struct height_view_stage height;
 	struct pass *develop;
 	struct disc_buffer disc; /* of the last picture made */
 };
@@ -44,6 +46,7 @@ struct view_inputs {
 	const struct sky_tables *sky;
 	const struct field_maps *field;
 	const struct radiosity_light *light; /* NULL without clouds */
+	const struct height_view *seen;      /* of the view stage's own making: what the pixels see of the layer from above */
 };
 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler);

@@ -3,6 +3,11 @@
 #include "shaders/lib/view.glsl"
 #include "shaders/lib/colour.glsl"
 
+#ifndef __cplusplus
+uniform sampler2D seen_place;
+uniform sampler2D seen_light;
+#endif
+
 void view_show_paths(INOUT(view_parts) p)
 {
 	p.sun_direct *= arguments[1].x;
@@ -40,7 +45,12 @@ vec3 view_layer(view_parts p, int layer)
 void pass(ivec2 pixel)
 {
 	vec2 at = vec2(pixel) + 0.5;
-	view_parts parts = view_ray(camera_ray(at), vec3(sun_at_camera) * sun_disc_share(pixel));
+	vec3 disc = vec3(sun_at_camera) * sun_disc_share(pixel);
+#if VIEW_ABOVE
+	view_parts parts = view_ray_seen(camera_ray(at), disc, texelFetch(seen_place, pixel, 0), texelFetch(seen_light, pixel, 0));
+#else
+	view_parts parts = view_ray(camera_ray(at), disc);
+#endif
 	float shown = camera_shows(at) ? 1.0 : 0.0;
 #if VIEW_COLOR_ONLY
 	STORE(0, vec4(shown * colour_of_bands(view_sum(parts)), 1.0));

@@ -91,7 +91,7 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 struct sky_directions {
 	int view_count, azimuth_count; /* from 1 */
 	const double *view_zenith_deg; /* 0..90 */
-	const double *azimuth_deg;     /* of the viewing direction, clockwise from north */
+	const double *azimuth_deg;     /* -360..720, of the viewing direction, clockwise from north */
 };
 
 /* What a clear sky sends to the ground, per band, over the solar irradiance outside the atmosphere on a plane normal to the beam. */

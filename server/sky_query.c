@@ -10,7 +10,7 @@
 #include <string.h>
 
 static const struct query_list view_list = {"view_zenith_deg", 0, 90, SKY_VIEWS_MAX};
-static const struct query_list azimuth_list = {"azimuth_deg", 0, 360, SKY_AZIMUTHS_MAX};
+static const struct query_list azimuth_list = {"azimuth_deg", -360, 720, SKY_AZIMUTHS_MAX};
 
 static struct sky_query query_default(void)
 {

@@ -7,7 +7,8 @@
 uniform sampler2D transmittance_table;
 #endif
 
-// Transmittance of the air from height h towards a sun at cosine mu; fades over the disc of the sun as it sets behind the horizon. w: the way that the beam has come through aerosol, in metres of its density at the ground.
+// Transmittance of the air from height h towards a sun at cosine mu; fades over the disc of the sun as it sets behind the horizon. w: the way
+// that the beam has come through aerosol, in metres of its density at the ground.
 vec4 sun_passage(float h, float mu)
 {
 	float horizon = sphere_horizon(h);

@@ -106,7 +106,7 @@ def test_sun_by_time_and_place(daemon):
         ("view_zenith_deg=91", {"/view_zenith_deg/0"}),
         ("view_zenith_deg=0,-1,x,90", {"/view_zenith_deg/1", "/view_zenith_deg/2"}),
         ("view_zenith_deg=", {"/view_zenith_deg"}),
-        ("azimuth_deg=0,361&azimuth_deg=3", {"/azimuth_deg/1", "/azimuth_deg"}),
+        ("azimuth_deg=0,721&azimuth_deg=3", {"/azimuth_deg/1", "/azimuth_deg"}),
         ("azimuth_deg=" + ",".join(["1"] * 362), {"/azimuth_deg"}),
         ("view_zenith_deg=" + ",".join(["1"] * 92), {"/view_zenith_deg"}),
         ("sun.elevation_deg=-19&atmosphere.ozone_du=601&ground.type=moon", {"/sun/elevation_deg", "/atmosphere/ozone_du", "/ground/type"}),

@@ -6,16 +6,15 @@
 
 #include "renderer/stages/stage.h"
 
-enum { GROUND_PASS_COUNT = 2 };
+enum { GROUND_PASS_COUNT = 1 };
 
 struct ground_stage {
 	struct pass *passes[GROUND_PASS_COUNT];
 };
 
 struct ground_maps {
-	const struct texture *map;    /* reflectance per band (650, 550, 450 nm), 0..1 */
-	const struct texture *relief; /* noise, within -2..2, for what lies close by */
-	double mean[3];               /* of the map */
+	const struct texture *map; /* reflectance per band (650, 550, 450 nm), 0..1 */
+	double mean[3];            /* of the map */
 };
 
 bool ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler);

@@ -11,7 +11,7 @@ enum { PASS_SOURCES, PASS_START, PASS_EXCHANGE, PASS_CLOSE, PASS_REDUCE };
 static const struct pass_desc pass_descs[RADIOSITY_PASS_COUNT] = {
 	[PASS_SOURCES] = {.file = "shaders/passes/radiosity_sources.glsl",
 			  .outputs = 4,
-			  .samplers = {"transmittance_table", "field_coarse", "field_detail", "slab_table", "ground_map", "ground_relief"}},
+			  .samplers = {"transmittance_table", "field_coarse", "field_detail", "slab_table", "ground_map"}},
 	[PASS_START] = {.file = "shaders/passes/radiosity_start.glsl",
 			.outputs = 4,
 			.samplers = {"cloud_source", "ground_albedo_plane", "ground_direct"}},
@@ -110,9 +110,9 @@ static void run_sources(const struct radiosity_stage *stage, struct planes *plan
 			const struct sky_tables *sky, const struct field_maps *field, const struct texture *slab_rows)
 {
 	struct texture *targets[] = {&planes->source, &planes->cloud_albedo, &planes->ground_albedo, &planes->ground_direct};
-	pass_run(stage->passes[PASS_SOURCES], &(struct pass_run){.targets = targets,
-								 .samplers = {sky->transmittance, field->coarse, field->detail, slab_rows,
-									      ground->map, ground->relief}});
+	pass_run(stage->passes[PASS_SOURCES],
+		 &(struct pass_run){.targets = targets,
+				    .samplers = {sky->transmittance, field->coarse, field->detail, slab_rows, ground->map}});
 	/* The source is spread out by its levels; of the others only the means are asked for. */
 	radiosity_build_levels(stage->passes[PASS_REDUCE], &planes->source, &planes->cloud_albedo);
 	texture_build_mipmaps(&planes->ground_albedo);

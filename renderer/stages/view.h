@@ -16,6 +16,9 @@ enum view_side { VIEW_CLEAR, VIEW_BELOW, VIEW_ABOVE, VIEW_SIDES };
 /* Rows of the picture: rays of either kind, all to the ground, none to the ground. The numbers stand in shaders/lib/view.glsl. */
 enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 
+/* What the ground is close by. The numbers stand in shaders/lib/ground.glsl. */
+enum view_ground { VIEW_BARE, VIEW_GROWN, VIEW_SEA, VIEW_ICE, VIEW_GROUNDS };
+
 /* The view pass exists in many forms, since software renderers execute both sides of every branch. */
 struct view_variant {
 	enum view_side side;
@@ -23,13 +26,14 @@ struct view_variant {
 	enum shading shading;
 	bool twilight; /* the base of the layer is lit by the sun somewhere */
 	bool layers;   /* several, else the color alone */
+	enum view_ground ground;
 };
 
 struct view_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	/* By shading, side, twilight, layers, region. Those that most pictures need are made at the start, the others with the first
-	 * picture that wants them. */
-	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS];
+	/* By shading, side, twilight, layers, region, ground. Those that most pictures need are made at the start, the others with the
+	 * first picture that wants them. */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][VIEW_GROUNDS];
 	struct pass *develop;
 };
 
@@ -40,6 +44,7 @@ struct view_inputs {
 	const struct sky_tables *sky;
 	const struct field_maps *field;
 	const struct radiosity_light *light; /* NULL without clouds */
+	const struct texture *sea_sky;       /* what a sea mirrors; NULL for other grounds */
 };
 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler);
@@ -47,6 +52,12 @@ void view_stage_finish(struct view_stage *stage);
 
 /* Fills in the block's camera. Call before any pass runs, since the sky is tabulated from the camera's height. */
 void view_fill_block(struct scene_block *block, const struct scene *scene);
+
+/* Compiles a file that includes shaders/lib/view.glsl, as a variant of it. NULL after log lines. */
+struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, const struct view_variant *variant);
+
+/* Hands the run the textures that such a program reads. */
+void view_bind_inputs(struct pass_run *run, const struct view_variant *variant, const struct view_inputs *inputs);
 
 /* Renders layers[0..count) into textures of the output's size (RGBA32F), owned by the cache and valid for this frame. cancelled may be
  * NULL; it is asked between passes. false when cancelled, out of memory, or when a program does not compile. */

@@ -215,7 +215,6 @@ def test_rules_across_members(daemon, scene, pointer):
     [
         ("clouds", "type", ["altocumulus", "cirrocumulus"]),
         ("clouds", "map", ["name"]),
-        ("ground", "type", ["grass", "soil", "sand"]),
         ("ground", "map", ["name"]),
         ("camera", "projection", ["fisheye", "equirectangular", "cubemap"]),
         ("camera", "face", ["+X"]),

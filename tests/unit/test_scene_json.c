@@ -175,9 +175,9 @@ static void test_later(void **state)
 	assert_later("{\"clouds\":{\"type\":\"altocumulus\"}}", "/clouds/type");
 	assert_later("{\"clouds\":{\"type\":\"cirrocumulus\"}}", "/clouds/type");
 	assert_later("{\"clouds\":{\"map\":\"a\"}}", "/clouds/map");
-	assert_later("{\"ground\":{\"type\":\"grass\"}}", "/ground/type");
-	assert_later("{\"ground\":{\"type\":\"soil\"}}", "/ground/type");
-	assert_later("{\"ground\":{\"type\":\"sand\"}}", "/ground/type");
+	assert_valid("{\"ground\":{\"type\":\"grass\"}}");
+	assert_valid("{\"ground\":{\"type\":\"soil\"}}");
+	assert_valid("{\"ground\":{\"type\":\"sand\"}}");
 	assert_later("{\"ground\":{\"map\":\"a\"}}", "/ground/map");
 	assert_later("{\"camera\":{\"projection\":\"cubemap\",\"face\":\"+X\"}}", "/camera/face");
 	assert_later("{\"camera\":{\"projection\":\"equirectangular\"}}", "/camera/projection");

@@ -30,6 +30,7 @@ static const char *const variant_names[VARIANTS] = {"clear",        "below",    
 #define VIEW_ABOVE      0
 #define VIEW_SOLVED     1
 #define VIEW_TWILIGHT   1
+#define VIEW_GROUND     1
 namespace glsl
 {
 namespace clear
@@ -185,7 +186,8 @@ static view_inputs inputs_of(const scene &scene, const made &out)
 		out.slab_slices,
 		&out.sky,
 		&out.field,
-		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light};
+		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light,
+		nullptr};
 }
 
 static picture render_gpu(const scene &scene, made &out)
@@ -248,7 +250,6 @@ static void copy_textures(const made &out)
 	glsl::air_to_layer = copy_of(out.sky.to_layer);
 	glsl::air_to_end = copy_of(out.sky.to_end);
 	glsl::ground_map = copy_of(out.ground.map);
-	glsl::ground_relief = copy_of(out.ground.relief);
 	glsl::field_coarse = copy_of(out.field.coarse);
 	glsl::field_detail = copy_of(out.field.detail);
 	glsl::height_table = copy_of(out.field.height);

@@ -34,10 +34,10 @@ enum { DEFAULT_CACHE_BYTES = 256 << 20 };
 
 static bool compile_stages(struct renderer *renderer, const struct pass_compiler *compiler)
 {
+	ground_stage_init(&renderer->ground, compiler);
 	sea_stage_init(&renderer->sea, compiler);
-	return ground_stage_init(&renderer->ground, compiler) && sky_stage_init(&renderer->sky, compiler) &&
-	       field_stage_init(&renderer->field, compiler) && radiosity_stage_init(&renderer->radiosity, compiler) &&
-	       view_stage_init(&renderer->view, compiler);
+	return sky_stage_init(&renderer->sky, compiler) && field_stage_init(&renderer->field, compiler) &&
+	       radiosity_stage_init(&renderer->radiosity, compiler) && view_stage_init(&renderer->view, compiler);
 }
 
 static void finish_stages(struct renderer *renderer)

@@ -3,14 +3,8 @@
 #include "renderer/log.h"
 #include "renderer/stages/sea.h"
 
-#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
-
-enum { PASS_PAINT };
-
-static const struct pass_desc pass_descs[GROUND_PASS_COUNT] = {
-	[PASS_PAINT] = {.file = "shaders/passes/ground_paint.glsl", .outputs = 1},
-};
 
 enum { UNIFORM_SIDE = 4, PICTURE_SIDE = 1024 };
 
@@ -20,7 +14,7 @@ static const struct {
 	bool picture;
 	double contrast, slope, stretch;
 } types[GROUND_TYPE_COUNT] = {
-	[GROUND_GRASS] = {true, 0.30, 0, 1},     [GROUND_COUNTRY] = {true, 0.32, 0, 1}, [GROUND_SOIL] = {true, 0.16, 0.16, 1},
+	[GROUND_GRASS] = {true, 0.30, 0, 1},     [GROUND_COUNTRY] = {true, 0.32, 0, 1}, [GROUND_SOIL] = {true, 0.16, 0.12, 1},
 	[GROUND_SAND] = {true, 0.05, 0.10, 2.2}, [GROUND_SEA] = {false, 0, 0, 1},       [GROUND_SEA_ICE] = {true, 0.02, 0.06, 2},
 	[GROUND_SNOW] = {true, 0.012, 0.06, 2},  [GROUND_BLACK] = {false, 0, 0, 1},     [GROUND_LAMBERT] = {false, 0, 0, 1},
 };
@@ -37,32 +31,38 @@ static void ground_destroy(void *value)
 	free(ground);
 }
 
-bool ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler)
+void ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler)
 {
-	return stage_create_passes(compiler, pass_descs, stage->passes, GROUND_PASS_COUNT);
+	*stage = (struct ground_stage){.compiler = *compiler};
 }
 
 void ground_stage_finish(struct ground_stage *stage)
 {
-	stage_destroy_passes(stage->passes, GROUND_PASS_COUNT);
+	stage_destroy_passes(stage->paint, GROUND_TYPE_COUNT);
 }
 
-static void paint(const struct pass *pass, struct texture *texture)
+static bool paint(struct ground_stage *stage, enum ground_type type, struct texture *texture)
 {
-	pass_run(pass, &(struct pass_run){.targets = &texture, .arguments = {{(float)texture->width}}});
+	char defines[32];
+	const struct pass_desc desc = {.file = "shaders/passes/ground_paint.glsl", .defines = defines, .outputs = 1};
+	snprintf(defines, sizeof defines, "#define GROUND_TYPE %d\n", type);
+	if (!stage->paint[type] && !(stage->paint[type] = pass_create(&stage->compiler, &desc)))
+		return false;
+	pass_run(stage->paint[type], &(struct pass_run){.targets = &texture, .arguments = {{(float)texture->width}}});
 	texture_build_mipmaps(texture);
+	return true;
 }
 
-static struct ground *ground_compute(const struct ground_stage *stage, int side)
+static struct ground *ground_compute(struct ground_stage *stage, enum ground_type type, int side)
 {
 	struct ground *ground = calloc(1, sizeof *ground);
 	if (!ground)
 		return NULL;
-	if (!texture_init(&ground->map, side, side, TEXTURE_RGBA16, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
+	if (!texture_init(&ground->map, side, side, TEXTURE_RGBA16, TEXTURE_REPEAT | TEXTURE_MIPMAPS) ||
+	    !paint(stage, type, &ground->map)) {
 		ground_destroy(ground);
 		return NULL;
 	}
-	paint(stage->passes[PASS_PAINT], &ground->map);
 	float mean[4];
 	stage_read_texture(&ground->map, ground->map.levels - 1, 4, mean);
 	for (int band = 0; band < 3; band++)
@@ -89,7 +89,7 @@ static void fill_block(struct scene_block *block, const struct scene *scene, int
 	block->ground_patch[3] = (float)types[scene->ground.type].stretch;
 }
 
-bool ground_stage_run(const struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps)
+bool ground_stage_run(struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps)
 {
 	const int side = types[scene->ground.type].picture ? PICTURE_SIDE : UNIFORM_SIDE;
 	fill_block(&context->block, scene, side);
@@ -102,9 +102,9 @@ bool ground_stage_run(const struct ground_stage *stage, struct stage_context *co
 	if (!ground) {
 		context->reused = false;
 		stage_upload_block(context);
-		ground = ground_compute(stage, side);
+		ground = ground_compute(stage, scene->ground.type, side);
 		if (!ground || !cache_keep(context->cache, &key, ground, texture_bytes(&ground->map), ground_destroy)) {
-			log_error("ground: out of memory");
+			log_error("ground: cannot be painted");
 			return false;
 		}
 	}

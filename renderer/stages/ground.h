@@ -6,10 +6,9 @@
 
 #include "renderer/stages/stage.h"
 
-enum { GROUND_PASS_COUNT = 1 };
-
 struct ground_stage {
-	struct pass *passes[GROUND_PASS_COUNT];
+	struct pass_compiler compiler;         /* shader_dir must outlive the stage */
+	struct pass *paint[GROUND_TYPE_COUNT]; /* made with the first picture of a type */
 };
 
 struct ground_maps {
@@ -17,10 +16,11 @@ struct ground_maps {
 	double mean[3];            /* of the map */
 };
 
-bool ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler);
+void ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler);
 void ground_stage_finish(struct ground_stage *stage);
 
-/* Fills in the block's ground members. Maps stay valid for this frame. false (and a log line) when out of memory. */
-bool ground_stage_run(const struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps);
+/* Fills in the block's ground members. Maps stay valid for this frame. false (and a log line) when out of memory or when a program does not
+ * compile. */
+bool ground_stage_run(struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps);
 
 #endif

@@ -58,8 +58,8 @@ vec2 ground_detail(ground_point p)
 }
 #endif
 #if VIEW_GROUND == 1
-// What grows stands up: seen at a slant it is tufts and crowns one behind the other, not their pattern on the ground foreshortened. Rows of them stand along the axis that the
-// view crosses more steeply, on a lattice of the world; the first one that the ray meets on its last way to the ground is seen.
+// What grows stands up: seen at a slant it is tufts and crowns one behind the other, not their pattern on the ground foreshortened. Rows of them stand across the view (nearly: in
+// one of eight directions, on lattices of the world), and the first one that the ray meets on its last way to the ground is seen.
 const int GROUND_ROWS = 4;
 const float GROUND_TUFT = 0.3; // m, the smallest; farther away several are one
 
@@ -77,19 +77,21 @@ vec2 ground_tuft(float base, float inside, int row, uint seed)
 
 vec2 ground_detail(ground_point p)
 {
-	bool swap = abs(p.offset.x) > abs(p.offset.y);
-	vec2 offset = swap ? vec2(p.offset.y, p.offset.x) : p.offset; // along a row, across rows
-	vec2 foot = swap ? vec2(camera_position.y, camera_position.x) : vec2(camera_position.x, camera_position.y);
-	// Patches of some metres, which also fray the border between tufts of one size and the next.
-	vec3 patches = ground_noise(ground_lattice_at(vec2(camera_position.x, camera_position.y), p.offset, vec2(7.3)), 61u);
+	vec2 place = vec2(camera_position.x, camera_position.y);
+	// Patches of some metres, which also bend the rows, and fray the borders between tufts of one size or direction and the next.
+	vec3 patches = ground_noise(ground_lattice_at(place, p.offset, vec2(4.7)), 61u);
+	float heading = floor(atan(p.offset.x, p.offset.y) * (8.0 / PI) + 0.5 + 0.15 * patches.y) * (PI / 8.0);
+	vec2 forth = vec2(sin(heading), cos(heading));
+	vec2 aside = vec2(forth.y, -forth.x);
+	vec2 offset = vec2(dot(p.offset, aside), dot(p.offset, forth)); // along a row, across rows
+	vec2 foot = vec2(dot(place, aside), dot(place, forth));
 	float level = max(floor(log2(max(p.across * 6.0 / GROUND_TUFT, 1e-3)) + 0.35 * patches.z), 0.0);
 	float size = GROUND_TUFT * exp2(level);
 	float high = min(0.6 * size, 0.4 * camera_position.z);
 	float depth = abs(offset.y) * high / camera_position.z; // across rows, from where the ray is as high as the tufts to where it meets the ground
 	float spacing = GROUND_TUFT * exp2(ceil(log2(max(depth * (1.2 / float(GROUND_ROWS)), 1e-3) / GROUND_TUFT)));
-	float forward = offset.y < 0.0 ? -1.0 : 1.0;
 	float rows = floor(foot.y / spacing);
-	float last = (foot.y / spacing - rows + offset.y / spacing) * forward;
+	float last = foot.y / spacing - rows + offset.y / spacing + 0.5 * patches.x;
 	float first = last - depth / spacing;
 	float columns = floor(foot.x / size);
 	float start = foot.x / size - columns;
@@ -100,16 +102,18 @@ vec2 ground_detail(ground_point p)
 	for (int i = 0; i <= GROUND_ROWS; i++) {
 		float row = i == GROUND_ROWS ? last : min(ceil(first) + float(i), last);
 		float share = 1.0 - (last - row) * spacing / max(abs(offset.y), 1e-3); // of the way to the ground
-		int number = int(floor(row * forward + 0.5)) + int(rows);
+		int number = int(floor(row + 0.5)) + int(rows);
 		float at = offset.x * share / size;
 		vec2 tuft = ground_tuft(columns, start + at, number, 62u);
 		vec2 blade = ground_tuft(blades, blade_start + at * 13.0, number, 63u);
 		float above = camera_position.z * (1.0 - share);
-		bool meets = !met && (i == GROUND_ROWS || above < high * (0.25 + 0.45 * tuft.x + 0.3 * blade.x));
-		tone = meets ? tuft.y + 0.7 * blade.y + 0.8 * (above / high - 0.43) : tone;
+		bool meets = !met && (i == GROUND_ROWS || above < high * (0.05 + 0.75 * tuft.x + 0.3 * blade.x));
+		tone = meets ? 0.55 * tuft.y + blade.y + 0.8 * (above / high - 0.43) : tone;
 		met = met || meets;
 	}
-	return vec2(1.0, max(1.0 + ground_patch.y * (tone + 0.5 * patches.z), 0.2));
+	// Crowns of trees and what is larger differ less than tufts do.
+	float contrast = ground_patch.y * (0.4 + 0.6 / (1.0 + size * size * 0.04));
+	return vec2(1.0, max(1.0 + contrast * (tone + 0.5 * patches.z / (1.0 + p.across)), 0.2));
 }
 #endif
 #if VIEW_GROUND == 3

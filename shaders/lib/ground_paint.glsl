@@ -1,17 +1,8 @@
-// Reflectance of the ground per band (650, 550, 450 nm), painted once as a periodic picture over the tile.
+// Reflectance of the ground per band (650, 550, 450 nm), painted once as a periodic picture over the tile. GROUND_TYPE: enum ground_type, fixed when the program is
+// built, since software renderers would execute all of them.
 #ifndef SHADERS_LIB_GROUND_PAINT
 #define SHADERS_LIB_GROUND_PAINT
 #include "shaders/lib/noise.glsl"
-
-// Types, as in enum ground_type.
-const float GROUND_GRASS = 0.0;
-const float GROUND_COUNTRY = 1.0;
-const float GROUND_SOIL = 2.0;
-const float GROUND_SAND = 3.0;
-const float GROUND_SEA = 4.0;
-const float GROUND_SEA_ICE = 5.0;
-const float GROUND_SNOW = 6.0;
-const float GROUND_BLACK = 7.0;
 
 // Published spectral albedos, read off at the bands. Vegetation, soils and sand: Bowker et al. 1985 ("Spectral Reflectances of Natural Targets for Use in Remote Sensing
 // Studies", NASA RP-1139) and Feister and Grewe 1995 (Photochem. Photobiol. 62, 736: grass, stubble, bare fertile soil, dry beach sand).
@@ -34,8 +25,8 @@ const vec3 ALBEDO_ICE_RIDGE = vec3(0.80, 0.83, 0.84);
 // inhabited latitudes takes some percent of it (Warren and Wiscombe 1980).
 const vec3 ALBEDO_SNOW = vec3(0.90, 0.92, 0.93);
 
-// Patchwork of fields: the two nearest of jittered points. x: hash 0..1 of the nearest, y: distance to the border between both, in lattice cells.
-vec2 ground_patches(vec2 p, int period, uint seed)
+// Patchwork: the two nearest of jittered points, by a distance that makes right angles if `angular`. x: hash 0..1 of the nearest, y: distance to the border between both, in lattice cells.
+vec2 ground_patches(vec2 p, int period, uint seed, bool angular)
 {
 	vec2 cell = floor(p);
 	float nearest = 9.0;
@@ -47,7 +38,7 @@ vec2 ground_patches(vec2 p, int period, uint seed)
 			int y = int(cell.y) + dy;
 			uint h = noise_hash2(noise_wrap(x, period), noise_wrap(y, period), seed);
 			vec2 away = vec2(float(x), float(y)) + vec2(noise_unit(h), noise_unit(noise_hash(h))) - p;
-			float d = length(away);
+			float d = angular ? max(abs(away.x + 0.3 * away.y), abs(away.y - 0.3 * away.x)) : length(away);
 			if (d < nearest) {
 				second = nearest;
 				nearest = d;
@@ -64,8 +55,8 @@ vec3 ground_country(vec2 p, float tile)
 {
 	int fields = max(1, int(tile / 420.0 + 0.5));
 	int woods = max(1, int(tile / 2600.0 + 0.5));
-	vec2 warp = 0.25 * vec2(noise_gradient(p * float(fields), fields, 41u, 0.0), noise_gradient(p * float(fields), fields, 42u, 0.0));
-	vec2 patches = ground_patches(p * float(fields) + warp, fields, 43u);
+	vec2 warp = 0.06 * vec2(noise_turbulence(p, fields, 3, 41u, 0.0), noise_turbulence(p, fields, 3, 42u, 0.0));
+	vec2 patches = ground_patches(p * float(fields) + warp, fields, 43u, true);
 	vec3 field = patches.x < 0.5 ? mix(ALBEDO_MEADOW, vec3(0.095, 0.13, 0.05), 2.0 * patches.x)
 	                             : patches.x < 0.8 ? mix(ALBEDO_MEADOW, ALBEDO_CROP, (patches.x - 0.5) / 0.3) : ALBEDO_SOIL;
 	field *= 1.0 + 0.06 * noise_turbulence(p, fields * 2, 4, 49u, 0.0);
@@ -86,8 +77,8 @@ vec3 ground_sea_ice(vec2 p, float tile)
 	int floes = max(1, int(tile / 3400.0 + 0.5));
 	int plates = floes * 5;
 	vec2 warp = 0.06 * vec2(noise_turbulence(p, floes, 6, 51u, 0.0), noise_turbulence(p, floes, 6, 52u, 0.0));
-	vec2 floe = ground_patches(p * float(floes) + warp, floes, 53u);
-	vec2 plate = ground_patches(p * float(plates) + warp * 2.5, plates, 55u);
+	vec2 floe = ground_patches(p * float(floes) + warp, floes, 53u, false);
+	vec2 plate = ground_patches(p * float(plates) + warp * 2.5, plates, 55u, false);
 	float basin = noise_turbulence(p, max(1, int(tile / 9000.0 + 0.5)), 4, 54u, 0.0);
 	// Leads are wide where the basin opens and close to cracks elsewhere.
 	float width = 0.015 + 0.30 * smoothstep(0.2, 1.6, basin);
@@ -107,28 +98,25 @@ vec3 ground_snow(vec2 p, float tile)
 	return ALBEDO_SNOW * (1.0 + 0.012 * noise_turbulence(p, drifts, 5, 58u, 0.0));
 }
 
-vec3 ground_paint_type(vec2 p, float tile, float type)
-{
-	if (type < GROUND_COUNTRY - 0.5)
-		return ground_mottled(p, tile, ALBEDO_GRASS, ALBEDO_GRASS_DRY, 46u);
-	if (type < GROUND_SOIL - 0.5)
-		return ground_country(p, tile);
-	if (type < GROUND_SAND - 0.5)
-		return ground_mottled(p, tile, ALBEDO_SOIL, ALBEDO_SOIL_DRY, 47u);
-	if (type < GROUND_SEA - 0.5)
-		return ground_mottled(p, tile, ALBEDO_SAND, ALBEDO_SAND_MOIST, 48u);
-	if (type < GROUND_SEA_ICE - 0.5)
-		return vec3(1.0); // its albedo goes by the sun and comes as the scale
-	if (type < GROUND_SNOW - 0.5)
-		return ground_sea_ice(p, tile);
-	if (type < GROUND_BLACK - 0.5)
-		return ground_snow(p, tile);
-	return vec3(type < GROUND_BLACK + 0.5 ? 0.0 : 1.0); // lambert: the scale is its albedo
-}
-
 // p: place in tiles.
 vec3 ground_paint(vec2 p)
 {
-	return min(ground_paint_type(p, ground_mean_albedo.w, ground_albedo.w) * vec3(ground_albedo), vec3(1.0));
+	float tile = ground_mean_albedo.w;
+#if GROUND_TYPE == 0
+	vec3 albedo = ground_mottled(p, tile, ALBEDO_GRASS, ALBEDO_GRASS_DRY, 46u);
+#elif GROUND_TYPE == 1
+	vec3 albedo = ground_country(p, tile);
+#elif GROUND_TYPE == 2
+	vec3 albedo = ground_mottled(p, tile, ALBEDO_SOIL, ALBEDO_SOIL_DRY, 47u);
+#elif GROUND_TYPE == 3
+	vec3 albedo = ground_mottled(p, tile, ALBEDO_SAND, ALBEDO_SAND_MOIST, 48u);
+#elif GROUND_TYPE == 5
+	vec3 albedo = ground_sea_ice(p, tile);
+#elif GROUND_TYPE == 6
+	vec3 albedo = ground_snow(p, tile);
+#else
+	vec3 albedo = vec3(GROUND_TYPE == 7 ? 0.0 : 1.0); // sea and lambert: the scale is all there is
+#endif
+	return min(albedo * vec3(ground_albedo), vec3(1.0));
 }
 #endif

@@ -1,5 +1,5 @@
-/* The sea and the ground close by: Fresnel, slopes, glitter and waves against closed forms and published values, compiled for the processor.
- * No OpenGL. */
+/* The sea and the ground close by: Fresnel, slopes, glitter and waves against closed forms and published values, compiled for the
+ * processor. No OpenGL. */
 extern "C" {
 #include "renderer/scene.h"
 #include "renderer/stages/sea.h"
@@ -136,8 +136,8 @@ static void glitter_holds_the_reflected_flux(void **)
 			const vec3 sun = direction(zenith, 30);
 			const double found = glitter_flux(s, sun), facets = facet_flux(s, sun);
 			const double flat = (double)sun.z * (double)sea_fresnel(sun.z);
-			print_message("wind %2.0f m/s, sun zenith %2.0f: glitter %.5f, facets %.5f, flat sea %.5f\n", wind, zenith, found, facets,
-				      flat);
+			print_message("wind %2.0f m/s, sun zenith %2.0f: glitter %.5f, facets %.5f, flat sea %.5f\n", wind, zenith, found,
+				      facets, flat);
 			/* What facets mirror onto others, more with wind and at a slant, is lost. */
 			assert_float_equal(found / facets, 1, zenith < 50 && wind <= 8 ? 0.015 : 0.1);
 			assert_true(found < 1.01 * facets);
@@ -146,7 +146,8 @@ static void glitter_holds_the_reflected_flux(void **)
 		}
 }
 
-/* The pattern's ridge: no slope sends more sun than that of the mirror where the sun is high, and at a slant it leans towards the viewer. */
+/* The pattern's ridge: no slope sends more sun than that of the mirror where the sun is high, and at a slant it leans towards the viewer.
+ */
 static void glitter_peaks_where_facets_mirror(void **)
 {
 	const sea_slopes s = rough_sea(8);
@@ -175,8 +176,8 @@ static void disc_has_equal_areas(void **)
 		}
 }
 
-/* Under a sky of radiance 1 the whole rough sea sends back 0.05 to 0.066 of what it receives (Payne 1972: 0.06 under overcast; Burt 1954 for roughened
- * water), never more than 1 in any direction, and at the horizon less than a flat mirror would. */
+/* Under a sky of radiance 1 the whole rough sea sends back 0.05 to 0.066 of what it receives (Payne 1972: 0.06 under overcast; Burt 1954
+ * for roughened water), never more than 1 in any direction, and at the horizon less than a flat mirror would. */
 static void sea_under_a_uniform_sky(void **)
 {
 	glsl::image::level texel = {1, 1, {vec4(1.0f)}};
@@ -319,12 +320,14 @@ static void detail_changes_no_mean(void **)
 		for (double elevation = 3; elevation < 90; elevation *= 3) {
 			double bare[2], grown[2];
 			set_ground(0.16, 0.16, 1, elevation);
-			mean_detail<ground_point>(distance, elevation, [](const ground_point &p) { return ground_detail(p); }, bare);
+			mean_detail<ground_point>(
+				distance, elevation, [](const ground_point &p) { return ground_detail(p); }, bare);
 			set_ground(0.32, 0, 1, elevation);
 			mean_detail<glsl::grown::ground_point>(
-				distance, elevation, [](const glsl::grown::ground_point &p) { return glsl::grown::ground_detail(p); }, grown);
-			print_message("%6.0f m, sun %2.0f degrees: bare %.3f, %.3f; grown %.3f, %.3f\n", distance, elevation, bare[0], bare[1],
-				      grown[0], grown[1]);
+				distance, elevation, [](const glsl::grown::ground_point &p) { return glsl::grown::ground_detail(p); },
+				grown);
+			print_message("%6.0f m, sun %2.0f degrees: bare %.3f, %.3f; grown %.3f, %.3f\n", distance, elevation, bare[0],
+				      bare[1], grown[0], grown[1]);
 			for (int k = 0; k < 2; k++) {
 				assert_float_equal(bare[k], 1, 0.03);
 				assert_float_equal(grown[k], 1, 0.03);

@@ -71,6 +71,8 @@ sea_slopes sea_slopes_at(vec2 offset, vec2 heading, float across, float along)
 		vec2 k = vec2(wave.x, wave.y);
 		float along_k = dot(k, heading) * along;
 		float k2 = dot(k, k);
+		if (k2 * across * across > 50.0)
+			break; // so are all that follow
 		float across_k2 = max(k2 * along * along - along_k * along_k, 0.0) * (across / along) * (across / along);
 		// Pixels weigh as a normal distribution of half their size.
 		float left = exp(-0.125 * (along_k * along_k + across_k2));

@@ -14,9 +14,9 @@ static const struct {
 	bool picture;
 	double contrast, slope, stretch;
 } types[GROUND_TYPE_COUNT] = {
-	[GROUND_GRASS] = {true, 0.30, 0, 1},     [GROUND_COUNTRY] = {true, 0.32, 0, 1}, [GROUND_SOIL] = {true, 0.16, 0.12, 1},
-	[GROUND_SAND] = {true, 0.05, 0.10, 1.6}, [GROUND_SEA] = {false, 0, 0, 1},       [GROUND_SEA_ICE] = {true, 0.02, 0.06, 2},
-	[GROUND_SNOW] = {true, 0.012, 0.06, 1.6},  [GROUND_BLACK] = {false, 0, 0, 1},     [GROUND_LAMBERT] = {false, 0, 0, 1},
+	[GROUND_GRASS] = {true, 0.30, 0, 1},      [GROUND_COUNTRY] = {true, 0.32, 0, 1}, [GROUND_SOIL] = {true, 0.16, 0.12, 1},
+	[GROUND_SAND] = {true, 0.05, 0.10, 1.6},  [GROUND_SEA] = {false, 0, 0, 1},       [GROUND_SEA_ICE] = {true, 0.02, 0.06, 2},
+	[GROUND_SNOW] = {true, 0.012, 0.06, 1.6}, [GROUND_BLACK] = {false, 0, 0, 1},     [GROUND_LAMBERT] = {false, 0, 0, 1},
 };
 
 struct ground {

@@ -124,10 +124,10 @@ const struct texture *sea_stage_run(struct sea_stage *stage, struct stage_contex
 					     .shading = clouds ? scene->model.shading : SHADING_SOLVED,
 					     .twilight = clouds && context->block.slab_light[1] > 0};
 	struct pass **pass = &stage->passes[clouds][variant.shading][variant.twilight];
-	if (!*pass && !(*pass = view_create_pass(&stage->compiler, "shaders/passes/sea_sky.glsl", &variant)))
+	if (!*pass && !(*pass = view_create_pass(&stage->compiler, "shaders/passes/sea_sky.glsl", 1, &variant)))
 		return NULL;
 	struct pass_run run = {0};
-	view_bind_inputs(&run, &variant, inputs);
+	view_bind_inputs(&run, variant.side, inputs);
 	sky = sky_compute(*pass, &run);
 	if (!sky || !cache_keep(context->cache, &key, sky, texture_bytes(sky), texture_destroy)) {
 		log_error("sea: out of memory");

@@ -30,10 +30,9 @@ static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.gl
 static const enum view_ground grounds[GROUND_TYPE_COUNT] = {
 	[GROUND_GRASS] = VIEW_GROWN, [GROUND_COUNTRY] = VIEW_GROWN, [GROUND_SEA] = VIEW_SEA, [GROUND_SEA_ICE] = VIEW_ICE};
 
-struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, const struct view_variant *variant)
+struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
 	char defines[256];
-	const int outputs = variant->layers ? VIEW_OUTPUTS : 1;
 	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
@@ -52,7 +51,7 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 	struct pass **pass =
 		&stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region][variant->ground];
 	if (!*pass)
-		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant);
+		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
 }
 
@@ -126,7 +125,8 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 				 camera->elevation_deg,
 				 camera->roll_deg,
 				 camera->vertical_fov_deg,
-				 camera->projection};
+				 camera->projection,
+				 scene->model.paths};
 	struct cache_key key = cache_key_make("view");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
@@ -161,14 +161,13 @@ static enum view_side side_of(const struct scene *scene, const struct view_input
 }
 
 /* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
-void view_bind_inputs(struct pass_run *run, const struct view_variant *variant, const struct view_inputs *in)
+void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
 {
-	const enum view_side side = variant->side;
 	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,
 					  in->sky->to_layer,      in->sky->to_end, in->ground->map};
 	const int common_count = sizeof common / sizeof *common;
 	memcpy(run->samplers, common, sizeof common);
-	if (variant->ground == VIEW_SEA)
+	if (in->sea_sky)
 		run->samplers[GROUND_SAMPLER] = in->sea_sky;
 	if (side == VIEW_CLEAR)
 		return;
@@ -252,8 +251,8 @@ static bool run_whole(struct view_stage *stage, struct view_variant variant, con
 }
 
 /* A clear sky has neither shading nor a layer to be lit from below. */
-static struct view_variant variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-				      bool layers)
+struct view_variant view_variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+				    bool layers)
 {
 	const enum view_side side = side_of(scene, inputs);
 	const enum view_ground ground = grounds[scene->ground.type];
@@ -272,8 +271,11 @@ static bool run_group(struct view_stage *stage, struct stage_context *context, c
 {
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const struct view_variant variant = variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR);
-	view_bind_inputs(&run, &variant, inputs);
+	const bool some_paths = scene->model.paths != SCENE_PATHS_ALL;
+	const struct view_variant variant = view_variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR || some_paths);
+	for (int i = 0; i <= LAYER_AIR - LAYER_SUN_DIRECT; i++)
+		run.arguments[1 + i / 4][i % 4] = (float)(scene->model.paths >> i & 1);
+	view_bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
 		targets[i] = picture_create(scene);

@@ -108,7 +108,7 @@ vec2 ground_detail(ground_point p)
 		vec2 blade = ground_tuft(blades, blade_start + at * 13.0, number, 63u);
 		float above = camera_position.z * (1.0 - share);
 		bool meets = !met && (i == GROUND_ROWS || above < high * (0.05 + 0.75 * tuft.x + 0.3 * blade.x));
-		tone = meets ? 0.55 * tuft.y + blade.y + 0.8 * (above / high - 0.43) : tone;
+		tone = meets ? 0.55 * tuft.y + blade.y + 0.5 * (above / high - 0.37) : tone;
 		met = met || meets;
 	}
 	// Crowns of trees and what is larger differ less than tufts do.

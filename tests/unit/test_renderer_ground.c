@@ -134,7 +134,7 @@ static void shadows_lie_where_the_parallax_says(void **state)
 		scene.ground.type = GROUND_LAMBERT;
 		for (int k = 0; k < 3; k++)
 			scene.ground.albedo[k] = 0.5;
-		scene.sun = (struct scene_sun){45, azimuth};
+		scene.sun = (struct scene_sun){.elevation_deg = 45, .azimuth_deg = azimuth};
 		scene.camera.position_m[2] = 9000;
 		scene.camera.elevation_deg = -90;
 		scene.camera.azimuth_deg = 0; /* north is up at the pole */
@@ -178,7 +178,7 @@ static struct scene sea_scene(double sun_elevation)
 	struct scene scene = small_scene(64, 64, LAYER(GROUND));
 	scene.ground.type = GROUND_SEA;
 	scene.clouds.type = CLOUD_NONE;
-	scene.sun = (struct scene_sun){sun_elevation, 180};
+	scene.sun = (struct scene_sun){.elevation_deg = sun_elevation, .azimuth_deg = 180};
 	scene.camera.azimuth_deg = 180;
 	scene.camera.elevation_deg = -10;
 	return scene;

@@ -303,6 +303,9 @@ template <typename Point, typename Detail> static void mean_detail(double distan
 	for (int i = 0; i < PLACES; i++) {
 		const double u = i * 0.7548776662, v = i * 0.5698402910;
 		const double azimuth = 2 * pi * (u - std::floor(u)), t = distance * (1 + 0.5 * (v - std::floor(v)));
+		/* From many places, since patches are some metres wide. */
+		glsl::camera_position.x = (float)(20000 * (i * 0.4142135624 - std::floor(i * 0.4142135624)));
+		glsl::camera_position.y = (float)(20000 * (i * 0.7320508076 - std::floor(i * 0.7320508076)));
 		Point p;
 		p.offset = vec2((float)(t * std::sin(azimuth)), (float)(t * std::cos(azimuth)));
 		p.across = (float)(1.5e-3 * t);

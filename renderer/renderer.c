@@ -7,6 +7,7 @@
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/illuminance.h"
+#include "renderer/stages/sea.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -25,6 +26,7 @@ struct renderer {
 	struct radiosity_stage radiosity;
 	struct view_stage view;
 	struct illuminance_stage illuminance;
+	struct sea_stage sea;
 	struct gl_timer timers[STAGE_COUNT];
 };
 
@@ -34,15 +36,17 @@ enum { DEFAULT_CACHE_BYTES = 256 << 20 };
 
 static bool compile_stages(struct renderer *renderer, const struct pass_compiler *compiler)
 {
+	ground_stage_init(&renderer->ground, compiler);
+	sea_stage_init(&renderer->sea, compiler);
 	illuminance_stage_init(&renderer->illuminance, compiler);
-	return ground_stage_init(&renderer->ground, compiler) && sky_stage_init(&renderer->sky, compiler) &&
-	       field_stage_init(&renderer->field, compiler) && radiosity_stage_init(&renderer->radiosity, compiler) &&
-	       view_stage_init(&renderer->view, compiler);
+	return sky_stage_init(&renderer->sky, compiler) && field_stage_init(&renderer->field, compiler) &&
+	       radiosity_stage_init(&renderer->radiosity, compiler) && view_stage_init(&renderer->view, compiler);
 }
 
 static void finish_stages(struct renderer *renderer)
 {
 	illuminance_stage_finish(&renderer->illuminance);
+	sea_stage_finish(&renderer->sea);
 	view_stage_finish(&renderer->view);
 	radiosity_stage_finish(&renderer->radiosity);
 	field_stage_finish(&renderer->field);
@@ -311,19 +315,40 @@ static int list_layers(const struct scene *scene, enum layer *layers)
 	return count;
 }
 
+/* What a sea mirrors is seen from its surface, whatever the camera's height. */
+static bool run_sea(struct job *job, struct view_inputs *inputs)
+{
+	struct stage_context *context = &job->renderer->context;
+	const struct scene_block kept = context->block;
+	struct scene low = *job->scene;
+	struct sky_tables sky;
+	struct view_inputs below = *inputs;
+	double albedo[3];
+	mean_albedo(job, albedo);
+	low.camera.position_m[2] = sea_eye_m;
+	context->block.camera_position[2] = (float)sea_eye_m;
+	context->block.camera_position[3] = 0.03f; /* radians between its texels, about */
+	below.sky = &sky;
+	if (sky_stage_run(&job->renderer->sky, context, &low, albedo, &sky))
+		inputs->sea_sky = sea_stage_run(&job->renderer->sea, context, &low, &below);
+	context->block = kept;
+	stage_upload_block(context);
+	return inputs->sea_sky;
+}
+
 static bool run_view(struct job *job)
 {
 	struct renderer *renderer = job->renderer;
 	struct stage_context *context = &renderer->context;
 	const struct scene_output *output = &job->scene->output;
 	struct frame *frame = job->frame;
-	const struct view_inputs inputs = {.ground = &job->ground,
-					   .droplets = job->droplets,
-					   .slab_rows = job->slab_rows,
-					   .slab_slices = job->slab_slices,
-					   .sky = &job->sky,
-					   .field = &job->maps,
-					   .light = job->clouds ? &job->light : NULL};
+	struct view_inputs inputs = {.ground = &job->ground,
+				     .droplets = job->droplets,
+				     .slab_rows = job->slab_rows,
+				     .slab_slices = job->slab_slices,
+				     .sky = &job->sky,
+				     .field = &job->maps,
+				     .light = job->clouds ? &job->light : NULL};
 	frame->exposure_ev = exposure_of(job);
 	context->block.develop[0] = output->exposure_auto;
 	context->block.develop[1] = (float)frame->exposure_ev;
@@ -333,6 +358,8 @@ static bool run_view(struct job *job)
 	if (!measure_illuminance(job, &inputs))
 		return false;
 	frame->layer_count = list_layers(job->scene, frame->layer);
+	if (job->scene->ground.type == GROUND_SEA && !run_sea(job, &inputs))
+		return false;
 	if (!view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
 			    job->cancel_context, job->pictures))
 		return false;
@@ -431,6 +458,7 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	cache_begin_frame(renderer->context.cache);
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
 	view_fill_block(&renderer->context.block, scene);
+	sea_fill_block(&renderer->context.block, scene);
 	/* The sky is tabulated up to the layer, so its heights are known before the field is. */
 	renderer->context.block.cloud_layer[0] = (float)scene->clouds.base_m;
 	renderer->context.block.cloud_layer[1] = (float)scene->clouds.thickness_m;

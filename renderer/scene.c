@@ -94,7 +94,8 @@ double scene_ground_largest_reflectance(const struct scene_ground *ground)
 {
 	/* Of what shaders/lib/ground_paint.glsl paints. */
 	static const double painted[GROUND_TYPE_COUNT] = {
-		[GROUND_COUNTRY] = 0.20, [GROUND_SEA] = 0.07, [GROUND_SEA_ICE] = 0.79, [GROUND_SNOW] = 0.87};
+		[GROUND_GRASS] = 0.13, [GROUND_COUNTRY] = 0.23, [GROUND_SOIL] = 0.22, [GROUND_SAND] = 0.42,
+		[GROUND_SEA] = 0.5,    [GROUND_SEA_ICE] = 0.88, [GROUND_SNOW] = 0.96};
 	double largest = painted[ground->type];
 	if (ground->type == GROUND_LAMBERT)
 		largest = fmax(ground->albedo[0], fmax(ground->albedo[1], ground->albedo[2]));

@@ -4,18 +4,19 @@
 #ifndef STRATUS_RENDERER_SCENE_BLOCK_H
 #define STRATUS_RENDERER_SCENE_BLOCK_H
 
-enum { SCENE_BLOCK_BINDING = 0 };
+enum { SCENE_BLOCK_BINDING = 0, SEA_WAVES = 24 };
 
 struct scene_block {
-	float sun_direction[4];      /* unit vector to the sun; angular radius in radians */
-	float sun_at_camera[4];      /* irradiance by the sun at the camera on a plane normal to the beam, W/m2/nm; - */
-	float solar_irradiance[4];   /* outside the atmosphere on a plane normal to the beam, W/m2/nm; - */
-	float rayleigh[4];           /* scattering coefficient at the ground, 1/m; scale height up to 10 km, m */
-	float aerosol[4];            /* extinction coefficient at the ground, 1/m; scale height, m */
-	float aerosol_shape[4];      /* single scattering albedo; asymmetry; -; - */
-	float ozone[4];              /* absorption coefficient at its peak, 1/m; height of the peak, m */
-	float ground_albedo[4];      /* of lambert ground, else the scale alone; type of ground (enum ground_type) */
-	float ground_patch[4];       /* side of the ground's picture in texels; contrast of its relief; -; - */
+	float sun_direction[4];    /* unit vector to the sun; angular radius in radians */
+	float sun_at_camera[4];    /* irradiance by the sun at the camera on a plane normal to the beam, W/m2/nm; - */
+	float solar_irradiance[4]; /* outside the atmosphere on a plane normal to the beam, W/m2/nm; - */
+	float rayleigh[4];         /* scattering coefficient at the ground, 1/m; scale height up to 10 km, m */
+	float aerosol[4];          /* extinction coefficient at the ground, 1/m; scale height, m */
+	float aerosol_shape[4];    /* single scattering albedo; asymmetry; -; - */
+	float ozone[4];            /* absorption coefficient at its peak, 1/m; height of the peak, m */
+	float ground_albedo[4];    /* of lambert ground, else the scale alone; type of ground (enum ground_type) */
+	float ground_patch[4];     /* side of the ground's picture in texels; of what is smaller: contrast, deviation of slopes, length over
+				      width; of a sea second its scale */
 	float ground_mean_albedo[4]; /* over the tile; tile of ground and cloud, m */
 	float camera_position[4];    /* x, y modulo the tile, z: metres above ground; angle between pixel centres, rad */
 	float camera_right[4];       /* unit; tangent of half the horizontal field of view */
@@ -41,7 +42,9 @@ struct scene_block {
 	float band_red[4];              /* linear Rec.709 of unit radiance at 650 nm, 1 = 1000 cd/m2 (stages/colour.h) */
 	float band_green[4];            /* 550 nm */
 	float band_blue[4];             /* 450 nm */
-	float develop[4]; /* exposure: automatic (1) or fixed (0); its value, EV; tone (enum tone); largest code of the output */
+	float develop[4];   /* exposure: automatic (1) or fixed (0); its value, EV; tone (enum tone); largest code of the output */
+	float sea_state[4]; /* covariance of the sea's slopes: east-east, east-north, north-north; share of foam */
+	float sea_waves[SEA_WAVES][4]; /* longest first: wave vector, 1/m, east, north; phase at the camera's foot; slope */
 };
 
 #endif

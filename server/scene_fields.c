@@ -32,8 +32,7 @@ const struct scene_field scene_fields[] = {
 	{"clouds", "map", FIELD_ASSET, AT(scene.clouds.map.name)},
 	{"clouds", "map_hash", FIELD_HASH, AT(scene.clouds.map.hash)},
 
-	{"ground", "type", FIELD_CHOICE, AT(scene.ground.type), .choices = scene_ground_type_names,
-	 .choices_later = LATER(GROUND_GRASS) | LATER(GROUND_SOIL) | LATER(GROUND_SAND)},
+	{"ground", "type", FIELD_CHOICE, AT(scene.ground.type), .choices = scene_ground_type_names},
 	{"ground", "albedo", FIELD_NUMBERS, AT(scene.ground.albedo), .range = {{0, 1}, {0, 1}, {0, 1}}, .count = 3},
 	{"ground", "albedo_scale", FIELD_NUMBER, AT(scene.ground.albedo_scale), BETWEEN(0, 2)},
 	{"ground", "map", FIELD_ASSET, AT(scene.ground.map.name)},

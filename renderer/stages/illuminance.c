@@ -82,7 +82,8 @@ bool illuminance_stage_run(struct illuminance_stage *stage, struct stage_context
 		*illuminance = *known;
 		return true;
 	}
-	const struct view_variant variant = view_variant_of(context, scene, inputs, false);
+	struct view_variant variant = view_variant_of(context, scene, inputs, false);
+	variant.ground = VIEW_BARE; /* none is looked at */
 	const struct pass *pass = pass_of(stage, &variant);
 	struct illuminance *kept = pass ? malloc(sizeof *kept) : NULL;
 	if (!kept || !compute(pass, context, &variant, inputs, illuminance)) {

@@ -15,7 +15,7 @@ static const struct pass_desc pass_descs[RADIOSITY_PASS_COUNT] = {
 			.samplers = {"thickness_table", "slab_table", "transmittance_table"}},
 	[PASS_GROUND] = {.file = "shaders/passes/radiosity_ground.glsl",
 			 .outputs = 2,
-			 .samplers = {"cloud_direct", "ground_map", "ground_relief", "transmittance_table"}},
+			 .samplers = {"cloud_direct", "ground_map", "transmittance_table"}},
 };
 
 /* What the exchange starts from: pictures that the passes paint, and the solver's copies, bands one plane after the other. */
@@ -78,10 +78,9 @@ static void paint_planes(const struct radiosity_stage *stage, struct planes *pla
 		 &(struct pass_run){.targets = (struct texture *[]){&all[CLOUD_SOURCE], &all[CLOUD_ALBEDO], &all[CLOUD_DIRECT]},
 				    .samplers = {field->thickness, slab_rows, sky->transmittance},
 				    .arguments = {{(float)field->thickness->width / (float)planes->side}}});
-	pass_run(stage->passes[PASS_GROUND],
-		 &(struct pass_run){.targets = (struct texture *[]){&all[GROUND_ALBEDO], &all[GROUND_DIRECT]},
-				    .samplers = {&all[CLOUD_DIRECT], ground->map, ground->relief, sky->transmittance},
-				    .arguments = {{(float)planes->side}}});
+	pass_run(stage->passes[PASS_GROUND], &(struct pass_run){.targets = (struct texture *[]){&all[GROUND_ALBEDO], &all[GROUND_DIRECT]},
+								.samplers = {&all[CLOUD_DIRECT], ground->map, sky->transmittance},
+								.arguments = {{(float)planes->side}}});
 }
 
 static void read_plane(struct planes *planes, int plane)

@@ -9,8 +9,11 @@
 #include <string.h>
 
 /* OpenGL grants 16 samplers; each side leaves some out. */
-#define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "ground_relief"
+#define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map"
 #define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received"
+
+/* A sea has no picture of its own, but one of the sky. */
+enum { GROUND_SAMPLER = 5 };
 
 static const struct {
 	const char *defines;
@@ -24,16 +27,22 @@ static const struct {
 };
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
 
+/* Of what lies close by (shaders/lib/ground.glsl). */
+static const enum view_ground grounds[GROUND_TYPE_COUNT] = {
+	[GROUND_GRASS] = VIEW_GROWN, [GROUND_COUNTRY] = VIEW_GROWN, [GROUND_SEA] = VIEW_SEA, [GROUND_SEA_ICE] = VIEW_ICE};
+
 struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
 	char defines[320];
 	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
-		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n",
+		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n",
 		 sides[variant->side].defines, variant->region, variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers,
-		 variant->projection, variant->large_sun);
+		 variant->projection, variant->large_sun, variant->ground);
 	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
+	if (variant->ground == VIEW_SEA)
+		desc.samplers[GROUND_SAMPLER] = "sea_sky";
 	return pass_create(compiler, &desc);
 }
 
@@ -41,7 +50,7 @@ struct pass *view_create_pass(const struct pass_compiler *compiler, const char *
 static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
 	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region]
-					   [variant->projection][variant->large_sun];
+					   [variant->projection][variant->large_sun][variant->ground];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
@@ -53,7 +62,8 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL && height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
-			ok = pass_of(stage, &(struct view_variant){.side = side, .region = region, .shading = SHADING_SOLVED});
+			ok = pass_of(stage, &(struct view_variant){
+						    .side = side, .region = region, .shading = SHADING_SOLVED, .ground = VIEW_GROWN});
 	if (!ok)
 		view_stage_finish(stage);
 	return ok;
@@ -61,7 +71,7 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0][0][0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	pass_destroy(stage->develop);
@@ -153,10 +163,12 @@ static enum view_side side_of(const struct scene *scene, const struct view_input
 /* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
 void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
 {
-	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,     in->sky->to_layer,
-					  in->sky->to_end,        in->ground->map, in->ground->relief};
+	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,
+					  in->sky->to_layer,      in->sky->to_end, in->ground->map};
 	const int common_count = sizeof common / sizeof *common;
 	memcpy(run->samplers, common, sizeof common);
+	if (in->sea_sky)
+		run->samplers[GROUND_SAMPLER] = in->sea_sky;
 	if (side == VIEW_CLEAR)
 		return;
 	const bool above = side == VIEW_ABOVE;
@@ -269,10 +281,14 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 				    bool layers)
 {
 	const enum view_side side = side_of(scene, inputs);
+	const enum view_ground ground = grounds[scene->ground.type];
 	if (side == VIEW_CLEAR)
-		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers};
-	return (struct view_variant){
-		.side = side, .shading = scene->model.shading, .twilight = context->block.slab_light[1] > 0, .layers = layers};
+		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground};
+	return (struct view_variant){.side = side,
+				     .shading = scene->model.shading,
+				     .twilight = context->block.slab_light[1] > 0,
+				     .layers = layers,
+				     .ground = ground};
 }
 
 /* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. */

@@ -18,6 +18,9 @@ enum view_side { VIEW_CLEAR, VIEW_BELOW, VIEW_ABOVE, VIEW_SIDES };
 /* Rows of the picture: rays of either kind, all to the ground, none to the ground. The numbers stand in shaders/lib/view.glsl. */
 enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 
+/* What the ground is close by. The numbers stand in shaders/lib/ground.glsl. */
+enum view_ground { VIEW_BARE, VIEW_GROWN, VIEW_SEA, VIEW_ICE, VIEW_GROUNDS };
+
 /* The view pass exists in many forms, since software renderers execute both sides of every branch. */
 struct view_variant {
 	enum view_side side;
@@ -27,13 +30,14 @@ struct view_variant {
 	bool layers;                /* several, else the color alone */
 	enum projection projection; /* of a camera_view */
 	bool large_sun;             /* sun_disc.large */
+	enum view_ground ground;
 };
 
 struct view_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	/* By shading, side, twilight, layers, region, projection, large sun. Those that most pictures need are made at the start, the
-	 * others with the first picture that wants them. */
-	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2];
+	/* By shading, side, twilight, layers, region, projection, large sun, ground. Those that most pictures need are made at the start,
+	 * the others with the first picture that wants them. */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][VIEW_GROUNDS];
 	struct height_view_stage height;
 	struct pass *develop;
 	struct disc_buffer disc; /* of the last picture made */
@@ -47,6 +51,7 @@ struct view_inputs {
 	const struct field_maps *field;
 	const struct radiosity_light *light; /* NULL without clouds */
 	const struct height_view *seen;      /* of the view stage's own making: what the pixels see of the layer from above */
+	const struct texture *sea_sky;       /* what a sea mirrors; NULL for other grounds */
 };
 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler);

@@ -72,6 +72,14 @@ float field_thickness_of(float density, float footprint)
 	return cloud_layer.y * clamp(cloud_threshold.z > 0.0 ? share : density, 0.0, 1.0);
 }
 
+// The same for a shadow, whose penumbra hides the detail and which is seen at a slant: no spline, but two levels whose texels blur as much.
+float field_thickness_shadow(vec2 place, float footprint)
+{
+	float lod = max(0.6, log2(footprint * cloud_threshold.w / cloud_layer.z));
+	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	return field_thickness_of(textureLod(field_coarse, uv, lod).x, footprint);
+}
+
 float field_thickness(vec2 place, float footprint)
 {
 	return cloud_layer.w < 0.5 ? 0.0 : field_thickness_of(field_density(place, footprint), footprint);

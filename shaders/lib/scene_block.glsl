@@ -1,6 +1,7 @@
 // The scene as uniforms; what each member is: renderer/scene_block.h.
 #ifndef SHADERS_LIB_SCENE_BLOCK
 #define SHADERS_LIB_SCENE_BLOCK
+const int SEA_WAVES = 24;
 #ifndef __cplusplus
 layout(std140, binding = 0) uniform scene_block {
 	vec4 sun_direction;
@@ -37,6 +38,8 @@ layout(std140, binding = 0) uniform scene_block {
 	vec4 band_green;
 	vec4 band_blue;
 	vec4 develop;
+	vec4 sea_state;
+	vec4 sea_waves[SEA_WAVES];
 };
 uniform vec4 arguments[4];
 #define INOUT(type) inout type

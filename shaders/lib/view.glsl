@@ -4,7 +4,11 @@
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/field.glsl"
 #include "shaders/lib/ground.glsl"
+#include "shaders/lib/ground_near.glsl"
 #include "shaders/lib/height_sun.glsl"
+#if VIEW_GROUND == 2
+#include "shaders/lib/sea.glsl"
+#endif
 #include "shaders/lib/sky_table.glsl"
 #include "shaders/lib/slab_solved.glsl"
 #include "shaders/lib/sun_disc.glsl"
@@ -55,21 +59,52 @@ float view_thickness(vec2 place, float footprint)
 }
 #endif
 
-// Radiance of the ground under sun, sky and clouds, before the air between.
-vec3 view_ground(vec2 place, float footprint, float mu_sun)
+#if VIEW_CLOUDS
+// Thickness that a shadow on the ground is of.
+float view_shadow_thickness(vec2 place, float footprint)
 {
+#if VIEW_ABOVE
+	return height_at(place, footprint);
+#else
+	return field_thickness_shadow(place, footprint);
+#endif
+}
+#endif
+
+// Radiance of the ground under sun, sky and clouds, before the air between.
+vec3 view_ground(vec2 place, ground_point point)
+{
+	float mu_sun = point.mu_sun;
+	// A pixel covers a long strip at a slant, which the means of squares stand for: larger ones than of the strip's area, lest rows at the horizon show single places.
+	float footprint = point.across * pow(point.mu_v, -0.75);
 	vec3 received = vec3(sky_irradiance_ground);
-	vec3 direct = sun_irradiance(0.0, mu_sun) * max(mu_sun, 0.0);
+	vec3 beam = sun_irradiance(0.0, mu_sun);
 #if VIEW_CLOUDS
 	{
 		received = vec3(textureLod(ground_received, place / cloud_layer.z, 0.0));
 		// The beam passed the layer where the parallax says; its shadow is as soft as the sun is wide.
 		vec2 through = place + vec2(sun_direction) * cloud_layer.x / max(sun_direction.z, 0.02);
 		float penumbra = 2.0 * sun_direction.w * cloud_layer.x;
-		direct *= slab_directional_transmittance(view_thickness(through, max(footprint, penumbra)));
+		beam *= slab_directional_transmittance(view_shadow_thickness(through, max(footprint, penumbra)));
 	}
 #endif
-	return ground_reflectance(place, footprint) * (received + direct) / PI;
+#if VIEW_GROUND == 2
+	vec2 heading = -point.offset * inversesqrt(max(dot(point.offset, point.offset), 1e-8));
+	vec2 flat_sun = vec2(sun_direction.x, sun_direction.y) * inversesqrt(max(1.0 - sun_direction.z * sun_direction.z, 1e-8));
+	vec3 to_viewer = vec3(heading * sqrt(1.0 - point.mu_v * point.mu_v), point.mu_v);
+	vec3 to_sun = vec3(flat_sun * sqrt(1.0 - mu_sun * mu_sun), mu_sun);
+	sea_slopes slopes = sea_slopes_at(point.offset, heading, point.across, point.across / point.mu_v);
+	return ground_patch.y * sea_radiance(slopes, to_viewer, to_sun, beam, received);
+#else
+	vec2 detail = ground_detail(point);
+	vec3 direct = beam * max(mu_sun, 0.0);
+#if VIEW_GROUND == 3
+	vec3 reflectance = ground_ice(ground_reflectance(place + ground_ragged(point), footprint), footprint);
+#else
+	vec3 reflectance = ground_reflectance(place, footprint);
+#endif
+	return reflectance * (received + direct * detail.x) * (detail.y / PI);
+#endif
 }
 
 #if VIEW_CLOUDS
@@ -316,11 +351,14 @@ void view_add_ground(vec3 direction, vec2 air, INOUT(view_parts) parts)
 	float t = max(sphere_distance_down(camera_position.z, min(direction.z, sphere_horizon(camera_position.z) - 1e-7), 0.0), 0.0);
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float mu_v = max(-sphere_cosine(camera_position.z, direction.z, t, 0.0), 0.002);
-	float footprint = camera_position.w * t * inversesqrt(mu_v);
-	float mu_sun = view_sun_cosine(direction, t, 0.0);
+	ground_point point;
+	point.offset = vec2(direction) * t;
+	point.across = camera_position.w * t;
+	point.mu_v = mu_v;
+	point.mu_sun = view_sun_cosine(direction, t, 0.0);
 	vec3 to_end = vec3(textureLod(air_to_end, air, 0.0));
 	if (parts.transmittance.y > 1e-5)
-		parts.ground = view_ground(place, footprint, mu_sun) * to_end * parts.transmittance;
+		parts.ground = view_ground(place, point) * to_end * parts.transmittance;
 	vec3 total = vec3(textureLod(sky_total, air, 0.0));
 #if VIEW_ABOVE
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));

@@ -218,7 +218,6 @@ def test_rules_across_members(daemon, scene, pointer):
 @pytest.mark.parametrize(
     "section, member, values",
     [
-        ("ground", "type", ["grass", "soil", "sand"]),
         ("model", "name", ["reference", "volume", "planar"]),
     ],
 )

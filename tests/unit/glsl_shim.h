@@ -151,7 +151,7 @@ inline vec4 textureLod(const sampler3D &sampler, vec3 at, float)
 }
 
 /* Samplers of the library. */
-static sampler2D field_coarse, field_detail, ground_map, ground_relief, height_table, height_light, height_start, smooth_table;
+static sampler2D field_coarse, field_detail, ground_map, sea_sky, height_table, height_light, height_start, smooth_table;
 static sampler2D height_below, shadow_below, shadow_table, received_table;
 static sampler2D probes, phase_table, event_table, slab_table;
 static sampler3D slab_slices;
@@ -201,14 +201,18 @@ static vec4 arguments[4], stored[8];
 	X(band_red)                                                                                                                        \
 	X(band_green)                                                                                                                      \
 	X(band_blue)                                                                                                                       \
-	X(develop)
+	X(develop)                                                                                                                         \
+	X(sea_state)
 
 #define GLSL_MEMBER(name) static vec4 name;
 GLSL_BLOCK(GLSL_MEMBER)
 #undef GLSL_MEMBER
 
 #define GLSL_COUNT(name) +1
-static_assert(sizeof(scene_block) == 16 * (0 GLSL_BLOCK(GLSL_COUNT)), "the scene block has other members than GLSL_BLOCK");
+/* And an array of them. */
+static vec4 sea_waves[SEA_WAVES];
+
+static_assert(sizeof(scene_block) == 16 * (SEA_WAVES GLSL_BLOCK(GLSL_COUNT)), "the scene block has other members than GLSL_BLOCK");
 #undef GLSL_COUNT
 
 /* Copies the block to the globals, as an upload of the uniform buffer does. */
@@ -217,6 +221,7 @@ inline void set_scene_block(const scene_block &block)
 #define GLSL_COPY(name) std::memcpy(&name, block.name, sizeof name);
 	GLSL_BLOCK(GLSL_COPY)
 #undef GLSL_COPY
+	std::memcpy(sea_waves, block.sea_waves, sizeof sea_waves);
 }
 } // namespace glsl
 

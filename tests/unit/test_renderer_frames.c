@@ -74,7 +74,8 @@ static void choose_projection(struct scene *scene)
 static struct scene random_scene(void)
 {
 	static const enum cloud_type types[] = {CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_ALTOCUMULUS, CLOUD_CIRROCUMULUS, CLOUD_NONE};
-	static const enum ground_type grounds[] = {GROUND_COUNTRY, GROUND_SEA, GROUND_SEA_ICE, GROUND_SNOW, GROUND_BLACK, GROUND_LAMBERT};
+	static const enum ground_type grounds[] = {GROUND_GRASS,   GROUND_COUNTRY, GROUND_SOIL,  GROUND_SAND,   GROUND_SEA,
+						   GROUND_SEA_ICE, GROUND_SNOW,    GROUND_BLACK, GROUND_LAMBERT};
 	struct scene scene = small_scene(64, 48, (1u << LAYER_COUNT) - 1);
 	scene.sun = (struct scene_sun){.elevation_deg = uniform(-18, 90), .azimuth_deg = uniform(0, 360)};
 	scene.dsd = (struct scene_dsd){spread(1, 5000), spread(1, 20), spread(1, 30)};
@@ -88,7 +89,7 @@ static struct scene random_scene(void)
 	scene.clouds.resolution = 64 << one_of(4);
 	scene.clouds.wind_mps[0] = uniform(-100, 100);
 	scene.clouds.wind_mps[1] = uniform(-100, 100);
-	scene.ground.type = grounds[one_of(6)];
+	scene.ground.type = grounds[one_of(sizeof grounds / sizeof *grounds)];
 	for (int i = 0; i < 3; i++)
 		scene.ground.albedo[i] = uniform(0, 1);
 	scene.atmosphere = (struct scene_atmosphere){uniform(0, 2), uniform(0, 600)};

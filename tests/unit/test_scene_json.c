@@ -214,9 +214,9 @@ static void assert_later(const char *body, const char *pointer)
 static void test_later(void **state)
 {
 	(void)state;
-	assert_later("{\"ground\":{\"type\":\"grass\"}}", "/ground/type");
-	assert_later("{\"ground\":{\"type\":\"soil\"}}", "/ground/type");
-	assert_later("{\"ground\":{\"type\":\"sand\"}}", "/ground/type");
+	assert_valid("{\"ground\":{\"type\":\"grass\"}}");
+	assert_valid("{\"ground\":{\"type\":\"soil\"}}");
+	assert_valid("{\"ground\":{\"type\":\"sand\"}}");
 	assert_later("{\"model\":{\"name\":\"volume\"}}", "/model/name");
 }
 

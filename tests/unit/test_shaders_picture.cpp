@@ -4,6 +4,7 @@
 extern "C" {
 #include "renderer/gl/context.h"
 #include "renderer/optics/kernel.h"
+#include "renderer/stages/sea.h"
 #include "renderer/stages/view.h"
 }
 #include "tests/unit/glsl_shim.h"
@@ -19,9 +20,10 @@ extern "C" {
 #include <cmocka.h>
 }
 
-enum { VARIANTS = 7 };
-static const char *const variant_names[VARIANTS] = {"clear",        "below",           "above",          "below, paper",
-						    "above, paper", "below, twilight", "above, twilight"};
+enum { VARIANTS = 11, FIRST_GROUND = 7 };
+static const char *const variant_names[VARIANTS] = {"clear",        "below",           "above",           "below, paper",
+						    "above, paper", "below, twilight", "above, twilight", "below, bare",
+						    "below, sea",   "below, sea ice",  "above, sea"};
 
 /* The view pass, once for each side and shading. */
 #define VIEW_REGION     0
@@ -30,6 +32,7 @@ static const char *const variant_names[VARIANTS] = {"clear",        "below",    
 #define VIEW_ABOVE      0
 #define VIEW_SOLVED     1
 #define VIEW_TWILIGHT   1
+#define VIEW_GROUND     1
 namespace glsl
 {
 namespace clear
@@ -75,13 +78,42 @@ namespace height_view_pass
 {
 #include "shaders/passes/height_view.glsl"
 } // namespace height_view_pass
+#include "tests/unit/glsl_again.h"
+#undef VIEW_GROUND
+#define VIEW_GROUND 2
+namespace above_sea
+{
+#include "shaders/passes/view.glsl"
+} // namespace above_sea
+#include "tests/unit/glsl_again.h"
+#undef VIEW_ABOVE
+#define VIEW_ABOVE 0
+namespace below_sea
+{
+#include "shaders/passes/view.glsl"
+} // namespace below_sea
+#include "tests/unit/glsl_again.h"
+#undef VIEW_GROUND
+#define VIEW_GROUND 0
+namespace below_bare
+{
+#include "shaders/passes/view.glsl"
+} // namespace below_bare
+#include "tests/unit/glsl_again.h"
+#undef VIEW_GROUND
+#define VIEW_GROUND 3
+namespace below_ice
+{
+#include "shaders/passes/view.glsl"
+} // namespace below_ice
 } // namespace glsl
 #undef VIEW_ABOVE
 #undef VIEW_CLOUDS
 
 static void (*const cpu_pass[VARIANTS])(glsl::ivec2) = {glsl::clear::pass,       glsl::below::pass,       glsl::above::pass,
 							glsl::below_paper::pass, glsl::above_paper::pass, glsl::below::pass,
-							glsl::above::pass};
+							glsl::above::pass,       glsl::below_bare::pass,  glsl::below_sea::pass,
+							glsl::below_ice::pass,   glsl::above_sea::pass};
 
 enum { WIDTH = 96, HEIGHT = 72, LAYERS = 5 };
 static const layer layers[LAYERS] = {LAYER_COLOR, LAYER_ORDER1, LAYER_MULTIPLE, LAYER_AIR, LAYER_OPTICAL_THICKNESS};
@@ -100,6 +132,7 @@ struct pipeline {
 	field_stage field;
 	radiosity_stage radiosity;
 	view_stage view;
+	sea_stage sea;
 };
 
 /* What a frame is made of; valid until the next. */
@@ -109,7 +142,7 @@ struct made {
 	field_maps field;
 	radiosity_light light;
 	const droplets *drops;
-	const texture *slab_rows, *slab_slices;
+	const texture *slab_rows, *slab_slices, *sea_sky;
 };
 
 static pipeline shared;
@@ -121,7 +154,9 @@ static void start(pass_kind kind)
 	shared.context.droplets = shared.store;
 	glCreateBuffers(1, &shared.context.block_buffer);
 	glNamedBufferStorage(shared.context.block_buffer, sizeof shared.context.block, nullptr, GL_DYNAMIC_STORAGE_BIT);
-	assert_true(ground_stage_init(&shared.ground, &compiler) && sky_stage_init(&shared.sky, &compiler));
+	ground_stage_init(&shared.ground, &compiler);
+	sea_stage_init(&shared.sea, &compiler);
+	assert_true(sky_stage_init(&shared.sky, &compiler));
 	assert_true(field_stage_init(&shared.field, &compiler) && radiosity_stage_init(&shared.radiosity, &compiler));
 	assert_true(view_stage_init(&shared.view, &compiler));
 }
@@ -130,6 +165,7 @@ static void stop()
 {
 	droplets_release(&shared.context);
 	view_stage_finish(&shared.view);
+	sea_stage_finish(&shared.sea);
 	radiosity_stage_finish(&shared.radiosity);
 	field_stage_finish(&shared.field);
 	sky_stage_finish(&shared.sky);
@@ -141,9 +177,10 @@ static void stop()
 static scene make_scene(int variant)
 {
 	struct scene scene = scene_default();
-	const int side = variant < 3 ? variant : variant % 2 ? 1 : 2;
+	static const ground_type grounds[] = {GROUND_SAND, GROUND_SEA, GROUND_SEA_ICE, GROUND_SEA};
+	const int side = variant < 3 ? variant : variant < FIRST_GROUND ? (variant % 2 ? 1 : 2) : variant == VARIANTS - 1 ? 2 : 1;
 	scene.model.shading = variant == 3 || variant == 4 ? SHADING_PAPER : SHADING_SOLVED;
-	if (variant >= 5)
+	if (variant == 5 || variant == 6)
 		scene.sun.elevation_deg = 0.5;
 	scene.output.width = WIDTH;
 	scene.output.height = HEIGHT;
@@ -152,12 +189,30 @@ static scene make_scene(int variant)
 	if (side == 0)
 		scene.clouds.type = CLOUD_NONE;
 	scene.camera.elevation_deg = side == 1 ? 25 : 8;
+	if (variant >= FIRST_GROUND) {
+		scene.ground.type = grounds[variant - FIRST_GROUND];
+		scene.camera.elevation_deg = -10;
+		scene.camera.azimuth_deg = 140;
+	}
 	if (side == 2) {
 		scene.camera.position_m[2] = 2600;
 		scene.camera.elevation_deg = -30;
 		scene.camera.roll_deg = 12;
 	}
 	return scene;
+}
+
+static view_inputs inputs_of(const scene &scene, const made &out)
+{
+	return {&out.ground,
+		out.drops,
+		out.slab_rows,
+		out.slab_slices,
+		&out.sky,
+		&out.field,
+		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light,
+		nullptr,
+		out.sea_sky};
 }
 
 /* The stages in their order, as renderer.c runs them. */
@@ -169,6 +224,7 @@ static void run_stages(const scene &scene, made &out)
 	cache_begin_frame(context->cache);
 	context->block = {};
 	view_fill_block(&context->block, &scene);
+	sea_fill_block(&context->block, &scene);
 	context->block.cloud_layer[0] = (float)scene.clouds.base_m;
 	context->block.cloud_layer[1] = (float)scene.clouds.thickness_m;
 	context->block.cloud_layer[3] = clouds;
@@ -186,18 +242,11 @@ static void run_stages(const scene &scene, made &out)
 		assert_true(radiosity_stage_run(&shared.radiosity, context, &scene, &out.ground, &out.sky, &out.field, out.slab_rows,
 						&out.light));
 	stage_upload_block(context);
-}
-
-static view_inputs inputs_of(const scene &scene, const made &out)
-{
-	return {&out.ground,
-		out.drops,
-		out.slab_rows,
-		out.slab_slices,
-		&out.sky,
-		&out.field,
-		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light,
-		nullptr};
+	if (scene.ground.type == GROUND_SEA) {
+		const view_inputs inputs = inputs_of(scene, out);
+		out.sea_sky = sea_stage_run(&shared.sea, context, &scene, &inputs);
+		assert_non_null(out.sea_sky);
+	}
 }
 
 static picture render_gpu(const scene &scene, made &out)
@@ -260,7 +309,7 @@ static void copy_textures(const made &out)
 	glsl::air_to_layer = copy_of(out.sky.to_layer);
 	glsl::air_to_end = copy_of(out.sky.to_end);
 	glsl::ground_map = copy_of(out.ground.map);
-	glsl::ground_relief = copy_of(out.ground.relief);
+	glsl::sea_sky = copy_of(out.sea_sky);
 	glsl::field_coarse = copy_of(out.field.coarse);
 	glsl::field_detail = copy_of(out.field.detail);
 	glsl::height_table = copy_of(out.field.height);

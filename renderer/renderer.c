@@ -256,14 +256,19 @@ static struct scene_light scene_light_of(const struct job *job)
 	const double mu = fmax(0, sin(job->scene->sun.elevation_deg * M_PI / 180));
 	const bool below = job->clouds && job->scene->camera.position_m[2] < job->scene->clouds.base_m;
 	const bool high = job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
+	const float *beam = job->renderer->context.block.sun_at_camera;
 	double direct[3], diffuse[3];
 	for (int band = 0; band < 3; band++) {
-		direct[band] = below ? job->light.ground_direct[band] : mu * (high ? job->sky.sun_cloud : job->sky.sun_ground)[band];
+		direct[band] = below ? job->light.ground_direct[band] : mu * beam[band];
 		diffuse[band] = below ? job->light.ground_diffuse[band] : (high ? job->sky.diffuse_cloud : job->sky.diffuse_ground)[band];
 	}
 	return (struct scene_light){
 		.direct = colour_luminance(direct), .diffuse = colour_luminance(diffuse), .beam = colour_luminance(job->sky.sun_cloud)};
 }
+
+/* From above a layer is looked at that sends back half to three quarters of what it gets: as snow is, it is exposed for more than a grey
+ * mean, so that it comes out white. */
+static const double exposure_above_ev = 0.5;
 
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is
@@ -273,9 +278,10 @@ static double exposure_of(const struct job *job)
 {
 	if (!job->scene->output.exposure_auto)
 		return job->scene->output.exposure_ev;
+	const bool above = scene_has_clouds(job->scene) && job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
 	const struct scene_light light = scene_light_of(job);
 	const double lux = fmax(0.65 * light.diffuse + 0.45 * light.direct + 0.08 * light.beam, 1e-2);
-	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000);
+	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) + (above ? exposure_above_ev : 0);
 }
 
 /* For files of scene light alone: nothing else can hold the figures. */
@@ -433,12 +439,54 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	const enum render_result result = run_stages(&job);
 	frame->radiosity_passes = job.light.passes;
 	frame->radiosity_residual = job.light.residual;
+	memcpy(frame->radiosity_residuals, job.light.residuals, sizeof frame->radiosity_residuals);
 	texture_finish(&job.developed);
 	droplets_release(&renderer->context);
 	if (result != RENDER_OK) {
 		if (result == RENDER_OUT_OF_MEMORY)
 			log_error("renderer: out of memory");
 		frame_finish(frame);
+	}
+	return result;
+}
+
+/* --- the sky alone ----------------------------------------------------------------------------------------------------------------- */
+
+static enum render_result run_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
+					struct sky_light *light)
+{
+	struct stage_context *context = &renderer->context;
+	struct ground_maps ground;
+	const bool ok = ground_stage_run(&renderer->ground, context, scene, &ground) &&
+			sky_stage_run_directions(&renderer->sky, context, scene, ground.mean, directions, light);
+	if (gl_failed("sky light") && !gl_failed_for_memory())
+		return RENDER_FAILED;
+	return ok ? RENDER_OK : gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+}
+
+enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
+				      renderer_cancelled *cancelled, void *context, struct sky_light *light)
+{
+	struct scene clear = *scene;
+	clear.clouds.type = CLOUD_NONE;
+	*light = (struct sky_light){0};
+	if (cancelled && cancelled(context))
+		return RENDER_CANCELLED;
+	cache_begin_frame(renderer->context.cache);
+	memset(&renderer->context.block, 0, sizeof renderer->context.block);
+	view_fill_block(&renderer->context.block, &clear);
+	renderer->context.reused = true;
+	gl_timer_begin(&renderer->timers[STAGE_SKY]);
+	enum render_result result = run_sky_light(renderer, &clear, directions, light);
+	gl_timer_end(&renderer->timers[STAGE_SKY]);
+	light->timing = (struct stage_timing){gl_timer_milliseconds(&renderer->timers[STAGE_SKY]), false};
+	if (result == RENDER_OK && cancelled && cancelled(context))
+		result = RENDER_CANCELLED;
+	if (result != RENDER_OK) {
+		if (result == RENDER_OUT_OF_MEMORY)
+			log_error("renderer: out of memory");
+		free(light->radiance);
+		*light = (struct sky_light){0};
 	}
 	return result;
 }

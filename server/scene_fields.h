@@ -50,7 +50,6 @@ struct scene_field {
 struct scene_input {
 	struct scene scene;
 	double characteristic_radius_um;
-	char face[SCENE_NAME_MAX];
 	uint64_t given; /* bit i: scene_fields[i] was given, valid or not */
 };
 

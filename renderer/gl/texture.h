@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum texture_format { TEXTURE_R32F, TEXTURE_RG32F, TEXTURE_RGBA32F, TEXTURE_RGBA16F, TEXTURE_RGBA8, TEXTURE_RGBA16 };
+enum texture_format { TEXTURE_R32F, TEXTURE_RG32F, TEXTURE_RGBA32F, TEXTURE_RGBA16F, TEXTURE_RGBA8, TEXTURE_RGBA16, TEXTURE_RG16 };
 
 struct texture {
 	unsigned id; /* OpenGL name, 0 when there is none */

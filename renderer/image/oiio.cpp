@@ -215,22 +215,45 @@ void camera_matrix(const struct scene_camera &camera, float matrix[16])
 	matrix[15] = 1;
 }
 
+/* From camera space on to EXR's normalized device coordinates, (0, 0) at the upper left corner of the picture and (1, 1) at the lower
+ * right one, as homogeneous coordinates over the depth. width, height: of the picture at distance 1. */
+void device_matrix(const float camera[16], double width, double height, float matrix[16])
+{
+	for (int row = 0; row < 4; row++) {
+		const double x = camera[row * 4], y = camera[row * 4 + 1], depth = camera[row * 4 + 2];
+		matrix[row * 4] = static_cast<float>(x / width + 0.5 * depth);
+		matrix[row * 4 + 1] = static_cast<float>(0.5 * depth - y / height);
+		matrix[row * 4 + 2] = matrix[row * 4 + 3] = static_cast<float>(depth);
+	}
+}
+
+/* height: of the picture at distance 1 */
+void describe_perspective(ImageSpec &spec, const struct scene_camera &camera, double height)
+{
+	float to_camera[16], to_device[16];
+	const double width = height * spec.width / spec.height;
+	camera_matrix(camera, to_camera);
+	device_matrix(to_camera, width, height, to_device);
+	spec.attribute("worldtocamera", OIIO::TypeMatrix44, to_camera);
+	spec.attribute("worldToNDC", OIIO::TypeMatrix44, to_device);
+	spec.attribute("screenWindowWidth", static_cast<float>(width));
+}
+
 void describe_projection(ImageSpec &spec, const struct scene &scene)
 {
 	switch (scene.camera.projection) {
-	case PROJECTION_PERSPECTIVE: {
-		float matrix[16];
-		camera_matrix(scene.camera, matrix);
-		spec.attribute("worldtocamera", OIIO::TypeMatrix44, matrix);
-		const double height = 2 * std::tan(scene.camera.vertical_fov_deg * M_PI / 360);
-		spec.attribute("screenWindowWidth", static_cast<float>(height * spec.width / spec.height));
+	case PROJECTION_PERSPECTIVE:
+		describe_perspective(spec, scene.camera, 2 * std::tan(scene.camera.vertical_fov_deg * M_PI / 360));
 		break;
-	}
 	case PROJECTION_EQUIRECTANGULAR:
 		spec.attribute("textureformat", "LatLong Environment");
 		spec.attribute("openexr:levelmode", 0); /* one level: scan lines, no pyramid */
 		break;
 	case PROJECTION_CUBEMAP:
+		if (scene.camera.face != FACE_ALL) {
+			describe_perspective(spec, scene.camera, 2);
+			break;
+		}
 		spec.attribute("textureformat", "CubeFace Environment");
 		spec.attribute("openexr:levelmode", 0);
 		break;

@@ -27,6 +27,7 @@ BESIDE = {
     ("ground", "albedo"): {"ground": {"type": "lambert"}},
     ("output", "layers"): {"output": {"format": "exr"}},
     ("camera", "position_m"): {"clouds": {"type": "none"}},
+    ("camera", "face"): {"camera": {"projection": "cubemap"}},
 }
 # On these bounds another rule speaks: the sun below the horizon, the range of the effective radius.
 ELSEWHERE = {("sun", "latitude_deg"), ("sun", "longitude_deg"), ("dsd", "characteristic_radius_um")}
@@ -261,6 +262,28 @@ def test_slab_parameters(daemon, name, schema):
     if "default" in schema:
         plain = daemon.head("/v1/slab?" + "&".join(f"{n}={v}" for n, v in needed.items())).headers["ETag"]
         assert check(schema["default"]) == (200, plain)
+
+
+def test_sky_answer_conforms(daemon):
+    answer = daemon.get("/v1/sky").json
+    assert_conforms(answer, {"$ref": "#/components/schemas/Sky"})
+    assert names_of(answer) == names_in({"$ref": "#/components/schemas/Sky"})
+
+
+@pytest.mark.parametrize("name", ["SkyViewZeniths", "SkyAzimuths"])
+def test_sky_parameters(daemon, name):
+    """Ranges, lengths and defaults as described."""
+    parameter = CONTRACT["components"]["parameters"][name]
+    schema, item = parameter["schema"], parameter["schema"]["items"]
+
+    def check(values):
+        answer = daemon.head(f"/v1/sky?{parameter['name']}={','.join(map(str, values))}")
+        return answer.status, answer.headers["ETag"]
+
+    assert check([item["minimum"], item["maximum"]])[0] == 200
+    assert check([item["maximum"] + 1e-6])[0] == check([item["minimum"] - 1e-6])[0] == 422
+    assert check([0] * schema["maxItems"])[0] == 200 and check([0] * (schema["maxItems"] + 1))[0] == 422
+    assert check(schema["default"]) == (200, daemon.head("/v1/sky").headers["ETag"])
 
 
 def test_served_contract_is_the_file(daemon):

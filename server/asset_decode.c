@@ -70,6 +70,7 @@ struct examination {
 	int width;
 	struct asset_facts *facts;
 	bool finite;
+	double sum[3];
 };
 
 static void extend(struct asset_facts *facts, enum asset_use use, float value)
@@ -92,6 +93,7 @@ static bool examine_rows(void *context, const struct image_rows *rows)
 		for (int band = 0; band < 3; band++) {
 			extend(facts, ASSET_ALBEDO, albedo[band]);
 			examination->finite &= isfinite(albedo[band]);
+			examination->sum[band] += albedo[band];
 		}
 	}
 	return examination->finite;
@@ -115,6 +117,8 @@ bool asset_examine(const struct image_api *images, int fd, uint64_t size, struct
 		snprintf(error, error_size, "holds a value that is not finite");
 	else if (!ok)
 		snprintf(error, error_size, "cannot be read: %s", reason);
+	for (int band = 0; band < 3; band++)
+		facts->mean_albedo[band] = (float)(examination.sum[band] / ((double)file.width * file.height));
 end:
 	picture_file_finish(&file);
 	return ok;

@@ -21,6 +21,7 @@ struct asset_facts {
 	enum image_format format;
 	int width, height;
 	float lowest[ASSET_USE_COUNT], highest[ASSET_USE_COUNT]; /* of its values, by use */
+	float mean_albedo[3];                                    /* red, green, blue */
 };
 
 /* Looks through the first `size` bytes of an open file. false when it is no picture that can be used; `error` then says why. */

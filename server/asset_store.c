@@ -39,10 +39,11 @@ struct record {
 	uint64_t bytes;
 	char hash[40];
 	int32_t width, height;
-	float lowest[ASSET_USE_COUNT], highest[ASSET_USE_COUNT];
+	float lowest[ASSET_USE_COUNT], highest[ASSET_USE_COUNT], mean_albedo[3];
+	uint32_t zero;
 };
 static const char record_magic[8] = "stratusA";
-_Static_assert(sizeof(struct record) == 88, "a record has no padding");
+_Static_assert(sizeof(struct record) == 104, "a record has no padding");
 
 /* --- life ------------------------------------------------------------------------------------------------------------------------ */
 
@@ -132,6 +133,7 @@ enum asset_result asset_store_open(struct asset_store *store, const char *name, 
 	file->facts = (struct asset_facts){.format = (enum image_format)record.format, .width = record.width, .height = record.height};
 	memcpy(file->facts.lowest, record.lowest, sizeof record.lowest);
 	memcpy(file->facts.highest, record.highest, sizeof record.highest);
+	memcpy(file->facts.mean_albedo, record.mean_albedo, sizeof record.mean_albedo);
 	file->modified = status.st_mtime;
 	return ASSET_OK;
 }
@@ -358,6 +360,7 @@ static bool write_record(const struct asset_upload *upload, const struct asset_f
 	memcpy(record.hash, hash, DIGEST_SIZE);
 	memcpy(record.lowest, facts->lowest, sizeof record.lowest);
 	memcpy(record.highest, facts->highest, sizeof record.highest);
+	memcpy(record.mean_albedo, facts->mean_albedo, sizeof record.mean_albedo);
 	/* Most of the time goes here, before others have to wait. */
 	return file_write_all(upload->fd, &record, sizeof record) && fsync(upload->fd) == 0;
 }

@@ -105,11 +105,12 @@ static json_t *asset_to_json(const char *name, const struct asset_file *file)
 	char modified[32];
 	struct tm utc;
 	strftime(modified, sizeof modified, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&file->modified, &utc));
-	return json_pack("{s:s, s:s, s:I, s:s, s:i, s:i, s:[f,f], s:[f,f], s:s}", "name", name, "content_type",
+	const float *low = facts->lowest, *high = facts->highest, *mean = facts->mean_albedo;
+	return json_pack("{s:s, s:s, s:I, s:s, s:i, s:i, s:[f,f], s:[f,f], s:[f,f,f], s:s}", "name", name, "content_type",
 			 image_content_types[facts->format], "bytes", (json_int_t)file->bytes, "hash", file->hash, "width", facts->width,
-			 "height", facts->height, "thickness", (double)facts->lowest[ASSET_THICKNESS],
-			 (double)facts->highest[ASSET_THICKNESS], "albedo", (double)facts->lowest[ASSET_ALBEDO],
-			 (double)facts->highest[ASSET_ALBEDO], "modified", modified);
+			 "height", facts->height, "thickness", (double)low[ASSET_THICKNESS], (double)high[ASSET_THICKNESS], "albedo",
+			 (double)low[ASSET_ALBEDO], (double)high[ASSET_ALBEDO], "mean_albedo", (double)mean[0], (double)mean[1],
+			 (double)mean[2], "modified", modified);
 }
 
 static void add_to_list(void *context, const char *name, const struct asset_file *file)

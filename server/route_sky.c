@@ -10,6 +10,7 @@
 #include "server/clock.h"
 #include "server/entity_tag.h"
 #include "server/response.h"
+#include "server/scene_assets.h"
 #include "server/service.h"
 #include "server/sky_query.h"
 
@@ -104,7 +105,8 @@ static enum MHD_Result send_light(struct request *request, unsigned status, stru
 	if (status == MHD_HTTP_OK)
 		response_set(response, "Content-Type", "application/json");
 	response_set(response, "ETag", work->tag);
-	response_set(response, "Cache-Control", CACHE_KEEP);
+	/* The content of a map may change behind its name. */
+	response_set(response, "Cache-Control", *work->query.input.scene.ground.map.name ? CACHE_ASK : CACHE_KEEP);
 	return response_send(request, status, response);
 }
 
@@ -215,6 +217,18 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	return MHD_YES;
 }
 
+/* The sky depends on the ground by its mean alone, which is known of a map without decoding it. */
+static void read_query(struct request *request, struct sky_query *query)
+{
+	struct scene *scene = &query->input.scene;
+	struct scene_assets assets;
+	sky_query_read(request->query, query, &request->problem);
+	scene_assets_init(&assets);
+	scene_assets_find(request->service->assets, scene, &assets, &request->problem);
+	scene_assets_use_mean_ground(scene, &assets);
+	scene_assets_finish(scene, &assets);
+}
+
 enum MHD_Result route_sky(struct request *request)
 {
 	struct sky_work *work = calloc(1, sizeof *work);
@@ -224,7 +238,7 @@ enum MHD_Result route_sky(struct request *request)
 	request->work = work;
 	request->work_destroy = work_destroy;
 
-	sky_query_read(request->query, &work->query, &request->problem);
+	read_query(request, &work->query);
 	double deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);

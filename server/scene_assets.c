@@ -81,6 +81,12 @@ void scene_assets_find(struct asset_store *store, struct scene *scene, struct sc
 		find(store, scene, i, &assets->file[i], problem);
 }
 
+void scene_assets_use_mean_ground(struct scene *scene, const struct scene_assets *assets)
+{
+	for (int band = 0; *scene->ground.map.name && band < 3; band++)
+		scene->ground.albedo[band] = (double)assets->file[GROUND].facts.mean_albedo[band];
+}
+
 bool scene_assets_take(struct asset_maps *maps, struct scene *scene, struct scene_assets *assets)
 {
 	bool complete = true;

@@ -18,6 +18,9 @@ void scene_assets_init(struct scene_assets *assets);
  * speaks against them. scene_assets_finish in any case. */
 void scene_assets_find(struct asset_store *store, struct scene *scene, struct scene_assets *assets, struct problem *problem);
 
+/* For what depends on the mean of the ground alone: gives the scene a Lambertian ground of the map's mean reflectance. */
+void scene_assets_use_mean_ground(struct scene *scene, const struct scene_assets *assets);
+
 /* Takes from memory what is there. true when nothing is missing. */
 bool scene_assets_take(struct asset_maps *maps, struct scene *scene, struct scene_assets *assets);
 

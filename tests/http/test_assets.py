@@ -417,6 +417,26 @@ def test_other_calls_take_no_maps(daemon, put, picture):
         assert_problem(answer, 422, "invalid-scene")
 
 
+def test_clear_sky_over_a_map(daemon, put, picture):
+    """/v1/sky goes by the mean of the ground."""
+    linear = numpy.full((4, 4, 3), [0.1, 0.2, 0.3], numpy.float32)
+    linear[0] = [0.9, 0.6, 0.3]
+    put("ground", picture(linear, "float", "exr"))
+    mean = facts_of(daemon, "ground")["mean_albedo"]
+    assert mean == pytest.approx([0.3, 0.3, 0.3], abs=1e-6)
+    mapped = daemon.get("/v1/sky?ground.map=ground")
+    assert mapped.headers["Cache-Control"] == "no-cache"
+    lambert = daemon.get("/v1/sky?ground.type=lambert&ground.albedo=0.3,0.3,0.3")
+    black = daemon.get("/v1/sky?ground.type=black")
+    assert mapped.json["diffuse_irradiance"] == pytest.approx(lambert.json["diffuse_irradiance"], rel=1e-4)
+    assert mapped.json["diffuse_irradiance"][2] > 1.02 * black.json["diffuse_irradiance"][2]
+    put("ground", picture([[0.0]]))
+    darker = daemon.get("/v1/sky?ground.map=ground", If_None_Match=mapped.headers["ETag"])
+    assert darker.status == 200
+    assert darker.json["diffuse_irradiance"] == pytest.approx(black.json["diffuse_irradiance"], rel=1e-4)
+    assert_problem(daemon.get("/v1/sky?ground.map=nowhere"), 422, "invalid-scene")
+
+
 def test_content_decides_about_tags(daemon, put, picture, read_image):
     put("twin", picture([[0.3]]))
     scene = {"clouds": {"map": "twin"}, "ground": {"map": "twin"}, "output": SMALL}

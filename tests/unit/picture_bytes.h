@@ -15,8 +15,8 @@ struct file_bytes {
 
 static inline void put(struct file_bytes *to, const void *data, size_t size)
 {
-	if (to->size + size > to->room) {
-		to->room = 2 * (to->size + size);
+	if (!to->data || to->size + size > to->room) {
+		to->room = 2 * (to->size + size) + 16;
 		to->data = realloc(to->data, to->room);
 	}
 	memcpy(to->data + to->size, data, size);

@@ -104,6 +104,8 @@ static void test_grey(void **state)
 	assert_float_equal(facts.lowest[ASSET_THICKNESS], 0.2, 1e-6);
 	assert_float_equal(facts.highest[ASSET_THICKNESS], 1, 0);
 	assert_float_equal(facts.lowest[ASSET_ALBEDO], linear(0.2), 1e-6);
+	for (int band = 0; band < 3; band++)
+		assert_float_equal(facts.mean_albedo[band], (linear(0.2) + 1) / 2, 1e-6);
 }
 
 static void test_depths(void **state)

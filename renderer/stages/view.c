@@ -23,11 +23,10 @@ static const struct {
 };
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
 
-static struct pass *create_pass(const struct pass_compiler *compiler, const struct view_variant *variant)
+struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
 	char defines[256];
-	const int outputs = variant->layers ? VIEW_OUTPUTS : 1;
-	struct pass_desc desc = {.file = "shaders/passes/view.glsl", .defines = defines, .outputs = outputs};
+	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n",
 		 sides[variant->side].defines, variant->region, variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers);
@@ -40,7 +39,7 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 {
 	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region];
 	if (!*pass)
-		*pass = create_pass(&stage->compiler, variant);
+		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
 }
 
@@ -113,7 +112,8 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 				 camera->elevation_deg,
 				 camera->roll_deg,
 				 camera->vertical_fov_deg,
-				 camera->projection};
+				 camera->projection,
+				 scene->model.paths};
 	struct cache_key key = cache_key_make("view");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
@@ -148,7 +148,7 @@ static enum view_side side_of(const struct scene *scene, const struct view_input
 }
 
 /* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
-static void bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
+void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
 {
 	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,     in->sky->to_layer,
 					  in->sky->to_end,        in->ground->map, in->ground->relief};
@@ -236,8 +236,8 @@ static bool run_whole(struct view_stage *stage, struct view_variant variant, con
 }
 
 /* A clear sky has neither shading nor a layer to be lit from below. */
-static struct view_variant variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-				      bool layers)
+struct view_variant view_variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+				    bool layers)
 {
 	const enum view_side side = side_of(scene, inputs);
 	if (side == VIEW_CLEAR)
@@ -252,8 +252,11 @@ static bool run_group(struct view_stage *stage, struct stage_context *context, c
 {
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const struct view_variant variant = variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR);
-	bind_inputs(&run, variant.side, inputs);
+	const bool some_paths = scene->model.paths != SCENE_PATHS_ALL;
+	const struct view_variant variant = view_variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR || some_paths);
+	for (int i = 0; i <= LAYER_AIR - LAYER_SUN_DIRECT; i++)
+		run.arguments[1 + i / 4][i % 4] = (float)(scene->model.paths >> i & 1);
+	view_bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
 		targets[i] = picture_create(scene);

@@ -67,8 +67,9 @@ float field_thickness_of(float density, float footprint)
 	// Mean of what is above the threshold, of values spread evenly by the softness to either side.
 	float above = max(excess + softness, 0.0);
 	float soft = excess > softness ? excess : above * above / (4.0 * softness);
-	// A thin skirt around a thick middle: edges are translucent over some 100 m.
-	return cloud_layer.y * min((1.0 - pow(max(1.0 - soft, 0.0), cloud_threshold.z)) * soft * (1.0 + cloud_field.x) / (soft + cloud_field.x), 1.0);
+	// A thin skirt around a thick middle: edges are translucent over some 100 m. A map says itself how thick its clouds are.
+	float share = (1.0 - pow(max(1.0 - soft, 0.0), cloud_threshold.z)) * soft * (1.0 + cloud_field.x) / (soft + cloud_field.x);
+	return cloud_layer.y * clamp(cloud_threshold.z > 0.0 ? share : density, 0.0, 1.0);
 }
 
 float field_thickness(vec2 place, float footprint)

@@ -58,6 +58,19 @@ static double spread(double low, double high)
 	return exp(uniform(log(low), log(high)));
 }
 
+/* Half of the pictures are panoramas. */
+static void choose_projection(struct scene *scene)
+{
+	scene->camera.projection = one_of(2) ? PROJECTION_PERSPECTIVE : (enum projection)one_of(PROJECTION_COUNT);
+	if (scene->camera.projection == PROJECTION_CUBEMAP)
+		scene->camera.face = (enum cube_face)one_of(FACE_COUNT);
+	const struct scene_shape shape = scene_camera_shape(&scene->camera);
+	if (shape.ratio[0])
+		scene->output.width = 16 * shape.ratio[0], scene->output.height = 16 * shape.ratio[1];
+	if (shape.ratio[0] == shape.ratio[1] && shape.ratio[0])
+		scene->output.width = scene->output.height = 40;
+}
+
 static struct scene random_scene(void)
 {
 	static const enum cloud_type types[] = {CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_ALTOCUMULUS, CLOUD_CIRROCUMULUS, CLOUD_NONE};
@@ -88,6 +101,7 @@ static struct scene random_scene(void)
 	scene.camera.vertical_fov_deg = spread(0.5, 150);
 	scene.radiosity.enabled = one_of(4) != 0;
 	scene.radiosity.tolerance = spread(1e-4, 1);
+	choose_projection(&scene);
 	return scene;
 }
 

@@ -27,7 +27,7 @@ bool texture_init(struct texture *texture, int width, int height, enum texture_f
 /* The same with a third dimension, of one level, filtered linearly along all three and clamped to the edges. */
 bool texture_init_3d(struct texture *texture, int width, int height, int depth, enum texture_format format);
 
-/* Replaces level 0: rows of width x components floats, in three dimensions plane after plane. Not for TEXTURE_RGBA8/16. */
+/* Replaces level 0: rows of width x components floats, in three dimensions plane after plane. TEXTURE_RGBA8/16 take 0..1. */
 void texture_upload(const struct texture *texture, const float *values);
 
 /* Fills the other levels with box-filtered ones. */

@@ -7,6 +7,7 @@
 #include "shaders/lib/height_sun.glsl"
 #include "shaders/lib/sky_table.glsl"
 #include "shaders/lib/slab_solved.glsl"
+#include "shaders/lib/sun_disc.glsl"
 #include "shaders/lib/sunlight.glsl"
 
 #ifndef __cplusplus
@@ -39,18 +40,6 @@ float view_sun_cosine(vec3 direction, float t, float height)
 {
 	vec3 sun = vec3(sun_direction);
 	return clamp(((EARTH_RADIUS + camera_position.z) * sun.z + t * dot(direction, sun)) / (EARTH_RADIUS + height), -1.0, 1.0);
-}
-
-// The unscattered disc of the sun, limb darkened: 1 - u (1 - cos), u = 0.6 in the visible (Allen 1973), whose mean over the disc is 1 - u/3.
-vec3 view_sun_disc(vec3 direction)
-{
-	float angle = length(direction - vec3(sun_direction));
-	float radius = sun_direction.w;
-	float pixel = camera_position.w;
-	float cover = clamp(0.5 + (radius - angle) / pixel, 0.0, 1.0);
-	float rho = min(angle / radius, 1.0);
-	float limb = (1.0 - 0.6 * (1.0 - sqrt(1.0 - rho * rho))) / 0.8;
-	return vec3(sun_at_camera) * (cover * limb / (PI * radius * radius));
 }
 
 #if VIEW_CLOUDS
@@ -274,14 +263,14 @@ void view_attenuate(vec3 air, INOUT(view_parts) parts)
 
 #if VIEW_CLOUDS && !VIEW_ABOVE
 // Upwards from below the layer.
-view_parts view_from_below(vec3 direction, vec2 air)
+view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 {
 	view_parts parts = view_nothing();
 	float base = cloud_layer.x;
 	float t = sphere_distance_up(camera_position.z, direction.z, base);
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
-	float footprint = camera_position.w * t * inversesqrt(cos_view);
+	float footprint = camera_footprint(t, cos_view);
 	view_point p = view_point_at(direction, view_thickness(place, footprint), height_smooth(place, footprint), cos_view, view_sun_cosine(direction, t, base));
 
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
@@ -289,7 +278,7 @@ view_parts view_from_below(vec3 direction, vec2 air)
 	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud), to_layer * vec3(textureLod(cloud_received, place / cloud_layer.z, 0.0)), parts);
 
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
-	parts.sun_direct = view_sun_disc(direction) * exp(-vec3(extinction) * (p.thickness / p.mu_v));
+	parts.sun_direct = disc * exp(-vec3(extinction) * (p.thickness / p.mu_v));
 	parts.sky = max(vec3(textureLod(sky_total, air, 0.0)) - near, vec3(0.0)) * parts.transmittance;
 	parts.air = near * vec3(air_below) + (vec3(1.0) - to_layer) * vec3(air_around);
 	parts.distance = p.thickness > 0.01 ? t : 0.0;
@@ -346,12 +335,12 @@ void view_add_ground(vec3 direction, vec2 air, INOUT(view_parts) parts)
 
 #if !VIEW_CLOUDS || VIEW_ABOVE
 // What lies above the horizon where no layer is between, or behind the cloud top that `parts` holds.
-void view_add_sky(vec3 direction, vec2 air, INOUT(view_parts) parts)
+void view_add_sky(vec3 disc, vec2 air, INOUT(view_parts) parts)
 {
 	bool cloud = parts.distance > 0.0;
 	vec3 total = vec3(textureLod(sky_total, air, 0.0));
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
-	parts.sun_direct = view_sun_disc(direction) * parts.transmittance;
+	parts.sun_direct = disc * parts.transmittance;
 	parts.air = cloud ? near : vec3(0.0);
 	parts.sky = cloud ? max(total - near, vec3(0.0)) * parts.transmittance : total;
 }
@@ -359,11 +348,12 @@ void view_add_sky(vec3 direction, vec2 air, INOUT(view_parts) parts)
 
 // The whole picture. Decided when the shader is built, since software renderers execute both sides of every branch:
 // VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_SOLVED: shading; VIEW_TWILIGHT: the sun lights the base somewhere; VIEW_COLOR_ONLY: parts are not asked for; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
+// disc: radiance of the sun's disc in the pixel, before the layer.
 // place, light: what a ray from above sees of the layer, as shaders/passes/height_view.glsl stores it; place.x = 0: nothing.
 #if VIEW_ABOVE
-view_parts view_ray_seen(vec3 direction, vec4 place, vec4 light)
+view_parts view_ray_seen(vec3 direction, vec3 disc, vec4 place, vec4 light)
 #else
-view_parts view_ray(vec3 direction)
+view_parts view_ray(vec3 direction, vec3 disc)
 #endif
 {
 	vec2 air = sky_table_coordinates(direction);
@@ -384,9 +374,9 @@ view_parts view_ray(vec3 direction)
 		view_add_ground(direction, air, parts);
 	} else {
 #if VIEW_CLOUDS && !VIEW_ABOVE
-		parts = view_from_below(direction, air);
+		parts = view_from_below(direction, air, disc);
 #else
-		view_add_sky(direction, air, parts);
+		view_add_sky(disc, air, parts);
 #endif
 	}
 	return parts;
@@ -394,9 +384,9 @@ view_parts view_ray(vec3 direction)
 
 #if VIEW_ABOVE
 // Of a ray that does not meet the layer.
-view_parts view_ray(vec3 direction)
+view_parts view_ray(vec3 direction, vec3 disc)
 {
-	return view_ray_seen(direction, vec4(0.0), vec4(0.0));
+	return view_ray_seen(direction, disc, vec4(0.0), vec4(0.0));
 }
 #endif
 

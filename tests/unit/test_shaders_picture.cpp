@@ -272,6 +272,10 @@ static void copy_textures(const made &out)
 	glsl::slab_slices = copy_of_volume(out.slab_slices);
 	glsl::ground_received = copy_of(out.light.ground_received);
 	glsl::cloud_received = copy_of(out.light.cloud_received);
+	GLint bytes = 0;
+	glGetNamedBufferParameteriv(shared.view.disc.buffer, GL_BUFFER_SIZE, &bytes);
+	glsl::sun_disc_weights.resize((size_t)bytes / sizeof(float));
+	glGetNamedBufferSubData(shared.view.disc.buffer, 0, bytes, glsl::sun_disc_weights.data());
 }
 
 /* What a pass stores, as a texture. */
@@ -308,6 +312,8 @@ static picture render_cpu(int variant, const made &out)
 	glsl::arguments[1] = glsl::arguments[2] = glsl::arguments[3] = glsl::vec4(1.0f);
 	for (int i = 0; i < LAYERS; i++) {
 		glsl::arguments[0].x = (float)layers[i];
+		for (int k = 1; k < 4; k++)
+			glsl::arguments[k] = glsl::vec4(1.0f); /* all paths */
 		for (int y = 0; y < HEIGHT; y++)
 			for (int x = 0; x < WIDTH; x++) {
 				cpu_pass[variant](glsl::ivec2(x, y));

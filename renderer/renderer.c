@@ -270,9 +270,9 @@ static struct scene_light scene_light_of(const struct job *job)
 		.direct = colour_luminance(direct), .diffuse = colour_luminance(diffuse), .beam = colour_luminance(job->sky.sun_cloud)};
 }
 
-/* From above a layer is looked at that sends back half to three quarters of what it gets: as snow is, it is exposed for more than a grey
- * mean, so that it comes out white. */
-static const double exposure_above_ev = 0.5;
+/* From above a layer is looked at that sends back half to three quarters of what it gets: as snow in the sun is, it is exposed for more
+ * than a grey mean, so that it comes out white. As far as the sun lights it. */
+static const double exposure_above_ev = 0.7;
 
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is
@@ -285,7 +285,8 @@ static double exposure_of(const struct job *job)
 	const bool above = scene_has_clouds(job->scene) && job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
 	const struct scene_light light = scene_light_of(job);
 	const double lux = fmax(0.65 * light.diffuse + 0.45 * light.direct + 0.08 * light.beam, 1e-2);
-	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) + (above ? exposure_above_ev : 0);
+	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) +
+	       (above ? exposure_above_ev * light.direct / (light.direct + light.diffuse + 1e-9) : 0);
 }
 
 /* For files of scene light alone: nothing else can hold the figures. */

@@ -12,7 +12,8 @@ const int HEIGHT_ITERATIONS = 128;
 const float HEIGHT_OPAQUE = 0.02;
 // Pixels a side of the blocks that begin together.
 const int HEIGHT_BLOCK = 8;
-const float HEIGHT_LEVEL_MAX = 7.0;
+// Over longer hops than half of such a cell the Earth's curve would count.
+const float HEIGHT_LEVEL_MAX = 8.0;
 
 // Where a ray from the camera lies between the highest top and the base, m; x > y where it does not.
 vec2 height_range(vec3 direction)
@@ -150,7 +151,8 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			level -= 1.0;
 			cell *= 0.5;
 		} else {
-			float gap = z - tap.x;
+			// Where there is no cloud, what the base's height is off by is none either.
+			float gap = z - tap.x + 3.0 * max(1.0 - tap.x, 0.0);
 			float stride = 0.7 * width + (gap > 0.0 ? 0.35 : -0.8) * gap;
 #if HEIGHT_NEAR
 			if (puff_depth > 0.0) {
@@ -189,8 +191,8 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			t = t < range.y ? min(t + min(stride * slowness, longest), range.y) : range.y + 1.0;
 		}
 	}
-	if (t <= range.y && path.clear > HEIGHT_OPAQUE) {
-		// Out of steps, which happens far away along the tops: there is always another cloud.
+	if (t <= range.y && path.clear > HEIGHT_OPAQUE && height_tap(origin + rate * t, 5.0).x > 1.0) {
+		// Out of steps, which happens far away along the tops: where there are any, there is always another cloud.
 		vec2 to_which = path.weight.x > 0.02 ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 		path.weight += path.clear * to_which;
 		path.distance += 1e-3 * t * to_which;

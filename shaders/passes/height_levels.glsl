@@ -7,8 +7,8 @@ uniform sampler2D height_below;
 
 vec2 texel_below(ivec2 at)
 {
-	int size = int(arguments[0].x);
-	return vec2(texelFetch(height_below, (at + size) % size, 0));
+	int last = int(arguments[0].x) - 1; // a power of two less one
+	return vec2(texelFetch(height_below, ivec2(at.x & last, at.y & last), 0));
 }
 
 void pass(ivec2 pixel)

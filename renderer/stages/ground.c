@@ -1,6 +1,7 @@
 #include "renderer/stages/ground.h"
 
 #include "renderer/log.h"
+#include "renderer/scene_map.h"
 #include "renderer/stages/sea.h"
 
 #include <stdio.h>
@@ -53,13 +54,33 @@ static bool paint(struct ground_stage *stage, enum ground_type type, struct text
 	return true;
 }
 
-static struct ground *ground_compute(struct ground_stage *stage, enum ground_type type, int side)
+/* A map's reflectance, scaled. */
+static bool upload_map(const struct scene_ground *ground, struct texture *texture)
+{
+	const size_t count = (size_t)texture->width * (size_t)texture->width;
+	float *texels = scene_map_texels(ground->map.map, texture->width), *padded = malloc(4 * count * sizeof *padded);
+	for (size_t i = 0; texels && padded && i < count; i++) {
+		for (size_t band = 0; band < 3; band++)
+			padded[4 * i + band] = (float)ground->albedo_scale * texels[3 * i + band];
+		padded[4 * i + 3] = 1;
+	}
+	const bool ok = texels && padded;
+	if (ok)
+		texture_upload(texture, padded);
+	free(padded);
+	free(texels);
+	if (ok)
+		texture_build_mipmaps(texture);
+	return ok;
+}
+
+static struct ground *ground_compute(struct ground_stage *stage, const struct scene_ground *scene, int side)
 {
 	struct ground *ground = calloc(1, sizeof *ground);
 	if (!ground)
 		return NULL;
 	if (!texture_init(&ground->map, side, side, TEXTURE_RGBA16, TEXTURE_REPEAT | TEXTURE_MIPMAPS) ||
-	    !paint(stage, type, &ground->map)) {
+	    !(scene->map.map ? upload_map(scene, &ground->map) : paint(stage, scene->type, &ground->map))) {
 		ground_destroy(ground);
 		return NULL;
 	}
@@ -89,20 +110,33 @@ static void fill_block(struct scene_block *block, const struct scene *scene, int
 	block->ground_patch[3] = (float)types[scene->ground.type].stretch;
 }
 
+/* Texels a side of the picture. */
+static int side_of(const struct scene_ground *ground)
+{
+	const struct scene_map *map = ground->map.map;
+	int side = UNIFORM_SIDE;
+	if (!map)
+		return types[ground->type].picture ? PICTURE_SIDE : UNIFORM_SIDE;
+	while (side < SCENE_MAP_GROUND_SIDE && (side < map->width || side < map->height))
+		side *= 2;
+	return side;
+}
+
 bool ground_stage_run(struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps)
 {
-	const int side = types[scene->ground.type].picture ? PICTURE_SIDE : UNIFORM_SIDE;
+	const int side = side_of(&scene->ground);
 	fill_block(&context->block, scene, side);
 	const float *albedo = context->block.ground_albedo;
 	const double inputs[] = {scene->ground.type, albedo[0], albedo[1], albedo[2], scene->clouds.tile_m};
 	struct cache_key key = cache_key_make("ground");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
+	stage_key_add_map(&key, scene->ground.map.map);
 	struct ground *ground = cache_find(context->cache, &key);
 	if (!ground) {
 		context->reused = false;
 		stage_upload_block(context);
-		ground = ground_compute(stage, scene->ground.type, side);
+		ground = ground_compute(stage, &scene->ground, side);
 		if (!ground || !cache_keep(context->cache, &key, ground, texture_bytes(&ground->map), ground_destroy)) {
 			log_error("ground: cannot be painted");
 			return false;

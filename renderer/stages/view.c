@@ -10,7 +10,7 @@
 
 /* OpenGL grants 16 samplers; each side leaves some out. */
 #define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map"
-#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received", "smooth_table"
+#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received"
 
 /* A sea has no picture of its own, but one of the sky. */
 enum { GROUND_SAMPLER = 5 };
@@ -20,9 +20,10 @@ static const struct {
 	const char *samplers[PASS_SAMPLERS_MAX];
 } sides[VIEW_SIDES] = {
 	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
-	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS, CLOUD_SAMPLERS, "field_coarse", "field_detail"}},
+	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n",
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "smooth_table", "field_coarse", "field_detail"}},
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
-			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_table", "height_maximum"}},
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
 static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
 
@@ -32,13 +33,13 @@ static const enum view_ground grounds[GROUND_TYPE_COUNT] = {
 
 struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
-	char defines[256];
+	char defines[320];
 	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
-		 "#define VIEW_GROUND %d\n",
+		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n",
 		 sides[variant->side].defines, variant->region, variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers,
-		 variant->ground);
+		 variant->projection, variant->large_sun, variant->ground);
 	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
 	if (variant->ground == VIEW_SEA)
 		desc.samplers[GROUND_SAMPLER] = "sea_sky";
@@ -48,8 +49,8 @@ struct pass *view_create_pass(const struct pass_compiler *compiler, const char *
 /* NULL (and log lines with the driver's message) when it does not compile. */
 static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
-	struct pass **pass =
-		&stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region][variant->ground];
+	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region]
+					   [variant->projection][variant->large_sun][variant->ground];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
@@ -58,7 +59,7 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
-	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
+	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL && height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
 			ok = pass_of(stage, &(struct view_variant){
@@ -70,10 +71,12 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0][0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	pass_destroy(stage->develop);
+	disc_buffer_finish(&stage->disc);
+	height_view_finish(&stage->height);
 	*stage = (struct view_stage){0};
 }
 
@@ -85,27 +88,23 @@ static void set4(float *to, double x, double y, double z, double w)
 	to[3] = (float)w;
 }
 
-static void fill_camera(struct scene_block *block, const struct scene *scene)
+static void fill_camera(struct scene_block *block, const struct scene *scene, const struct camera_view *view)
 {
-	const struct scene_camera *camera = &scene->camera;
-	double axes[3][3];
-	scene_camera_axes(camera, axes);
-	const double tan_v = tan(0.5 * camera->vertical_fov_deg * M_PI / 180);
-	const double tan_h = tan_v * scene->output.width / scene->output.height;
+	const double(*axes)[3] = view->axes;
 	const double tile = scene->clouds.tile_m;
-	const double x = camera->position_m[0], y = camera->position_m[1];
-	set4(block->camera_position, x - tile * floor(x / tile), y - tile * floor(y / tile), camera->position_m[2],
-	     2 * tan_v / scene->output.height);
-	set4(block->camera_right, axes[0][0], axes[0][1], axes[0][2], tan_h);
-	set4(block->camera_up, axes[1][0], axes[1][1], axes[1][2], tan_v);
-	set4(block->camera_forward, axes[2][0], axes[2][1], axes[2][2], camera->projection);
-	set4(block->image_size, scene->output.width, scene->output.height, 1.0 / scene->output.width, 1.0 / scene->output.height);
+	const double x = scene->camera.position_m[0], y = scene->camera.position_m[1], z = scene->camera.position_m[2];
+	set4(block->camera_position, x - tile * floor(x / tile), y - tile * floor(y / tile), z, camera_pixel_angle(view));
+	set4(block->camera_right, axes[0][0], axes[0][1], axes[0][2], view->tangent[0]);
+	set4(block->camera_up, axes[1][0], axes[1][1], axes[1][2], view->tangent[1]);
+	set4(block->camera_forward, axes[2][0], axes[2][1], axes[2][2], view->first_row);
+	set4(block->image_size, view->width, view->height, 1.0 / view->width, 1.0 / view->height);
 }
 
 void view_fill_block(struct scene_block *block, const struct scene *scene)
 {
 	double matrix[3][3];
-	fill_camera(block, scene);
+	const struct camera_view view = camera_view_of(scene, 0);
+	fill_camera(block, scene, &view);
 	colour_band_matrix(matrix);
 	set4(block->band_red, matrix[0][0], matrix[1][0], matrix[2][0], 0);
 	set4(block->band_green, matrix[0][1], matrix[1][1], matrix[2][1], 0);
@@ -126,6 +125,7 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 				 camera->roll_deg,
 				 camera->vertical_fov_deg,
 				 camera->projection,
+				 camera->face,
 				 scene->model.paths};
 	struct cache_key key = cache_key_make("view");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
@@ -178,9 +178,9 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  in->field->smooth,
-					  above ? in->field->height : in->field->coarse,
-					  above ? in->field->maximum : in->field->detail};
+					  above ? in->field->light : in->field->smooth,
+					  above ? (in->seen ? &in->seen->place : NULL) : in->field->coarse,
+					  above ? (in->seen ? &in->seen->light : NULL) : in->field->detail};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -191,46 +191,50 @@ static double horizon_sine(const struct scene_block *block, double height)
 	return h < height ? 1 : -sqrt((h - height) * (2 * radius + h + height)) / (radius + h);
 }
 
-/* What the rays of a row of pixels have in common. The sine of the elevation along a row rises and falls at most once, so its ends, its
- * middle and the point nearest to the vertical plane bound it; a margin of two pixels covers the rest. */
-static enum view_region region_of_row(const struct scene_block *block, enum view_side side, int row)
+/* Least and greatest sine of the elevation along a row of pixels. That of a perspective rises and falls at most once along a row, so that
+ * its ends, its middle and points between bound it, but for the bulge between those, the square of their distance. */
+static void bound_row(const struct camera_view *view, int row, double *lowest, double *highest)
 {
 	enum { PROBES = 16 };
-	const double margin = 2 * block->camera_position[3] + 1e-6, ground = horizon_sine(block, 0);
+	const double bulge = view->projection == PROJECTION_PERSPECTIVE ? pow(view->tangent[0] / PROBES, 2) : 0;
+	*lowest = 1;
+	*highest = -1;
+	for (int i = 0; i <= PROBES; i++) {
+		const double at[2] = {(double)view->width * i / PROBES, row + 0.5};
+		double direction[3];
+		camera_direction(view, at, direction);
+		*lowest = fmin(*lowest, direction[2] - bulge);
+		*highest = fmax(*highest, direction[2] + bulge);
+	}
+}
+
+/* What the rays of a row of pixels have in common, with a margin of two pixels. */
+static enum view_region region_of_row(const struct scene_block *block, const struct camera_view *view, enum view_side side, int row)
+{
+	const double margin = 2 * camera_pixel_angle(view) + 1e-6, ground = horizon_sine(block, 0);
 	/* From above, rays that miss the ground may still graze the layer. */
 	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
-	const double y = 1 - 2 * (row + 0.5) * block->image_size[3];
-	double lowest = 1, highest = -1;
-	for (int i = 0; i <= PROBES; i++) {
-		const double x = 2.0 * i / PROBES - 1;
-		double d[3], length = 0;
-		for (int k = 0; k < 3; k++) {
-			d[k] = block->camera_forward[k] + x * block->camera_right[3] * block->camera_right[k] +
-			       y * block->camera_up[3] * block->camera_up[k];
-			length += d[k] * d[k];
-		}
-		lowest = fmin(lowest, d[2] / sqrt(length));
-		highest = fmax(highest, d[2] / sqrt(length));
-	}
-	/* Between probes a wide row can bulge beyond them by the square of their distance. */
-	const double bulge = pow(block->camera_right[3] / PROBES, 2);
-	if (lowest - bulge > sky + margin)
+	double lowest, highest;
+	if (view->projection == PROJECTION_FISHEYE)
+		return sky < -1e-6 ? VIEW_SKY : VIEW_MIXED; /* it ends at elevation 0 */
+	bound_row(view, row, &lowest, &highest);
+	if (lowest > sky + margin)
 		return VIEW_SKY;
-	return highest + bulge < ground - margin ? VIEW_GROUND : VIEW_MIXED;
+	return highest < ground - margin ? VIEW_GROUND : VIEW_MIXED;
 }
 
 /* Runs over rows of one kind after the other, each with the program made for it. */
-static bool run_regions(struct view_stage *stage, const struct stage_context *context, struct view_variant variant, struct pass_run *run)
+static bool run_regions(struct view_stage *stage, const struct stage_context *context, const struct camera_view *view,
+			struct view_variant variant, struct pass_run *run)
 {
-	const int height = run->targets[0]->height;
-	run->width = run->targets[0]->width;
-	for (int first = 0; first < height;) {
-		variant.region = region_of_row(&context->block, variant.side, first);
+	const int last = view->first_row + view->height;
+	for (int first = view->first_row; first < last;) {
+		variant.region = region_of_row(&context->block, view, variant.side, first);
 		const struct pass *pass = pass_of(stage, &variant);
 		if (!pass)
 			return false;
 		int end = first + 1;
-		while (end < height && region_of_row(&context->block, variant.side, end) == variant.region)
+		while (end < last && region_of_row(&context->block, view, variant.side, end) == variant.region)
 			end++;
 		run->first_row = first;
 		run->height = end - first;
@@ -241,13 +245,35 @@ static bool run_regions(struct view_stage *stage, const struct stage_context *co
 }
 
 /* The whole with one program. Pictures that are rare have no programs for their parts. */
-static bool run_whole(struct view_stage *stage, struct view_variant variant, const struct pass_run *run)
+static bool run_whole(struct view_stage *stage, const struct camera_view *view, struct view_variant variant, struct pass_run *run)
 {
 	variant.region = VIEW_MIXED;
 	const struct pass *pass = pass_of(stage, &variant);
+	run->first_row = view->first_row;
+	run->height = view->height;
 	if (pass)
 		pass_run(pass, run);
 	return pass;
+}
+
+/* One view of the picture after the other. */
+static bool run_views(struct view_stage *stage, struct stage_context *context, const struct scene *scene, struct view_variant variant,
+		      struct pass_run *run)
+{
+	/* Programs made only for this picture are not worth making three of. */
+	const bool whole = variant.layers || variant.twilight;
+	run->width = run->targets[0]->width;
+	for (int i = 0; i < camera_view_count(scene); i++) {
+		const struct camera_view view = camera_view_of(scene, i);
+		variant.projection = view.projection;
+		variant.large_sun = stage->disc.views[i].large;
+		fill_camera(&context->block, scene, &view);
+		disc_buffer_bind(&stage->disc, i, &context->block);
+		stage_upload_block(context);
+		if (!(whole ? run_whole(stage, &view, variant, run) : run_regions(stage, context, &view, variant, run)))
+			return false;
+	}
+	return true;
 }
 
 /* A clear sky has neither shading nor a layer to be lit from below. */
@@ -282,8 +308,7 @@ static bool run_group(struct view_stage *stage, struct stage_context *context, c
 		if (!targets[i])
 			goto fail;
 	}
-	const bool whole = variant.layers || variant.twilight;
-	if (!(whole ? run_whole(stage, variant, &run) : run_regions(stage, context, variant, &run)))
+	if (!run_views(stage, context, scene, variant, &run))
 		goto fail;
 	for (int i = 0; i < count; i++) {
 		const struct cache_key key = make_key(scene, layers[i]);
@@ -302,6 +327,20 @@ fail:
 	return false;
 }
 
+/* What the picture sees of the layer below the camera, one view after the other. */
+static bool see_layer(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct field_maps *field,
+		      struct height_view *seen)
+{
+	bool ok = height_view_create(scene, seen);
+	for (int i = 0; ok && i < camera_view_count(scene); i++) {
+		const struct camera_view view = camera_view_of(scene, i);
+		fill_camera(&context->block, scene, &view);
+		stage_upload_block(context);
+		ok = height_view_run(&stage->height, scene, &view, field, seen);
+	}
+	return ok;
+}
+
 bool view_stage_run(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
 		    const enum layer *layers, int count, renderer_cancelled *cancelled, void *cancel_context,
 		    const struct texture **pictures)
@@ -316,20 +355,24 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 			missing[missing_count++] = layers[i];
 		}
 	}
-	if (missing_count > 0)
-		context->reused = false;
-	for (int i = 0; i < missing_count;) {
-		if (cancelled && cancelled(cancel_context))
-			return false;
+	if (missing_count == 0)
+		return true;
+	context->reused = false;
+	struct height_view seen = {0};
+	struct view_inputs with_seen = *inputs;
+	with_seen.seen = &seen;
+	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0)) &&
+		  (side_of(scene, inputs) != VIEW_ABOVE || see_layer(stage, context, scene, inputs->field, &seen));
+	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
-		if (!run_group(stage, context, scene, inputs, missing + i, group, made))
-			return false;
+		ok = !(cancelled && cancelled(cancel_context)) && run_group(stage, context, scene, &with_seen, missing + i, group, made);
 		for (int k = 0; k < group; k++)
 			pictures[place[i + k]] = made[k];
 		i += group;
 	}
-	return true;
+	height_view_release(&seen);
+	return ok;
 }
 
 void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)

@@ -4,7 +4,7 @@
 
 void pass(ivec2 pixel)
 {
-	view_parts p = view_ray(sea_sky_direction((vec2(pixel) + 0.5) / SEA_SKY_SIZE));
+	view_parts p = view_ray(sea_sky_direction((vec2(pixel) + 0.5) / SEA_SKY_SIZE), vec3(0.0));
 	vec3 sum = p.multiple + p.cloud_sky + p.cloud_ground + p.sky + p.air;
 	// Under a high sun the beam holds the orders 0 and 1 too (slab_directional_transmittance); what a low one sends to the base from below it does not.
 	if (sun_direction.z <= 0.0)

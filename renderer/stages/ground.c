@@ -127,7 +127,7 @@ bool ground_stage_run(struct ground_stage *stage, struct stage_context *context,
 	const int side = side_of(&scene->ground);
 	fill_block(&context->block, scene, side);
 	const float *albedo = context->block.ground_albedo;
-	const double inputs[] = {scene->ground.type, albedo[0], albedo[1], albedo[2], scene->clouds.tile_m};
+	const double inputs[] = {scene->ground.type, albedo[0], albedo[1], albedo[2], scene->ground.albedo_scale, scene->clouds.tile_m};
 	struct cache_key key = cache_key_make("ground");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);

@@ -64,7 +64,7 @@ float view_thickness(vec2 place, float footprint)
 float view_shadow_thickness(vec2 place, float footprint)
 {
 #if VIEW_ABOVE
-	return height_at(place, footprint);
+	return view_thickness(place, footprint);
 #else
 	return field_thickness_shadow(place, footprint);
 #endif

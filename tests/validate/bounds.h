@@ -73,7 +73,7 @@ struct bound {
 	const char *unit; /* "%" shows it times 100 */
 };
 
-enum { BOUND_COUNT = 31 };
+enum { BOUND_COUNT = 37 };
 extern const struct bound bounds[BOUND_COUNT];
 
 enum verdict { VERDICT_REACHED, VERDICT_TOLERATED, VERDICT_BROKEN };

@@ -124,9 +124,9 @@ static void remove_shaders(struct deck *deck)
 static bool stages_init(struct deck *deck, bool uniform)
 {
 	const struct pass_compiler compiler = {.kind = PASS_FRAGMENT, .shader_dir = uniform ? deck->folder : NULL};
-	return (!uniform || write_shaders(deck)) && ground_stage_init(&deck->ground, &compiler) && sky_stage_init(&deck->sky, &compiler) &&
-	       field_stage_init(&deck->field, &compiler) && radiosity_stage_init(&deck->radiosity, &compiler) &&
-	       view_stage_init(&deck->view, &compiler);
+	ground_stage_init(&deck->ground, &compiler);
+	return (!uniform || write_shaders(deck)) && sky_stage_init(&deck->sky, &compiler) && field_stage_init(&deck->field, &compiler) &&
+	       radiosity_stage_init(&deck->radiosity, &compiler) && view_stage_init(&deck->view, &compiler);
 }
 
 struct deck *deck_create(const struct kernel *kernel, bool uniform)
@@ -265,8 +265,8 @@ static bool look(struct deck *deck, struct scene scene, double height, double az
 	scene.camera.azimuth_deg = fmod(azimuth + 720, 360);
 	scene.camera.elevation_deg = elevation;
 	bool ok = make(deck, &scene, made);
-	const struct view_inputs inputs = {&made->ground, made->droplets, made->slab_rows, made->slab_slices,
-					   &made->sky,    &made->field,   &made->light};
+	const struct view_inputs inputs = {
+		&made->ground, made->droplets, made->slab_rows, made->slab_slices, &made->sky, &made->field, &made->light, NULL, NULL};
 	if (ok) {
 		stage_upload_block(&deck->context);
 		ok = view_stage_run(&deck->view, &deck->context, &scene, &inputs, layers, LAYERS, NULL, NULL, pictures);

@@ -7,12 +7,13 @@
 #ifndef STRATUS_RENDERER_STAGES_FIELD_H
 #define STRATUS_RENDERER_STAGES_FIELD_H
 
-#include "renderer/stages/stage.h"
+#include "renderer/stages/packed.h"
 
 enum { FIELD_PASS_COUNT = 6 };
 
 struct field_stage {
 	struct pass *passes[FIELD_PASS_COUNT];
+	struct pass *pack;
 	unsigned histogram; /* OpenGL buffer */
 };
 
@@ -20,6 +21,8 @@ struct field_maps {
 	const struct texture *coarse, *detail;  /* density before the threshold, and its detail */
 	const struct texture *smooth;           /* thickness over the tile, m, evened out */
 	const struct texture *height, *maximum; /* thickness itself and its maxima; NULL unless asked for */
+	/* The first three packed, for views from below; coarse and detail NULL at resolutions where that would be too much memory. */
+	const struct texture *coarse_packed, *detail_packed, *smooth_packed;
 };
 
 bool field_stage_init(struct field_stage *stage, const struct pass_compiler *compiler);

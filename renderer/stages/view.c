@@ -21,7 +21,10 @@ static const struct {
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
 			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_table", "height_maximum"}},
 };
-static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
+static const struct pass_desc develop_descs[2] = {
+	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 0\n", .outputs = 1, .samplers = {"picture"}},
+	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 1\n", .outputs = 1, .samplers = {"picture"}},
+};
 
 static struct pass *create_pass(const struct pass_compiler *compiler, const struct view_variant *variant)
 {
@@ -29,8 +32,9 @@ static struct pass *create_pass(const struct pass_compiler *compiler, const stru
 	const int outputs = variant->layers ? VIEW_OUTPUTS : 1;
 	struct pass_desc desc = {.file = "shaders/passes/view.glsl", .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
-		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n",
-		 sides[variant->side].defines, variant->region, variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers);
+		 "%s%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n",
+		 sides[variant->side].defines, variant->packed ? "#define FIELD_PACKED 1\n" : "", variant->region,
+		 variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers);
 	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
 	return pass_create(compiler, &desc);
 }
@@ -38,7 +42,8 @@ static struct pass *create_pass(const struct pass_compiler *compiler, const stru
 /* NULL (and log lines with the driver's message) when it does not compile. */
 static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
-	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region];
+	struct pass **pass =
+		&stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->packed][variant->region];
 	if (!*pass)
 		*pass = create_pass(&stage->compiler, variant);
 	return *pass;
@@ -47,10 +52,13 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
-	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
+	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, 2) && view_up_init(&stage->up, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
-			ok = pass_of(stage, &(struct view_variant){.side = side, .region = region, .shading = SHADING_SOLVED});
+			ok = (side == VIEW_BELOW && region == VIEW_SKY) ||
+			     pass_of(stage,
+				     &(struct view_variant){
+					     .side = side, .region = region, .shading = SHADING_SOLVED, .packed = side == VIEW_BELOW});
 	if (!ok)
 		view_stage_finish(stage);
 	return ok;
@@ -58,10 +66,12 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
-	pass_destroy(stage->develop);
+	view_up_finish(&stage->up);
+	stage_destroy_passes(stage->develop, 2);
+	texture_finish(&stage->spare);
 	*stage = (struct view_stage){0};
 }
 
@@ -100,10 +110,12 @@ void view_fill_block(struct scene_block *block, const struct scene *scene)
 	set4(block->band_blue, matrix[0][2], matrix[1][2], matrix[2][2], 0);
 }
 
-static struct cache_key make_key(const struct scene *scene, enum layer layer)
+/* A color alone is made by other programs than one among layers, which is exactly their sum. */
+static struct cache_key make_key(const struct scene *scene, enum layer layer, bool alone)
 {
 	const struct scene_camera *camera = &scene->camera;
 	const double inputs[] = {layer,
+				 alone,
 				 scene->output.width,
 				 scene->output.height,
 				 camera->position_m[0],
@@ -121,22 +133,38 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 	return key;
 }
 
+/* What the cache keeps of a layer. */
+struct picture {
+	struct texture texture;
+	struct texture *spare; /* of the stage */
+};
+
+/* The memory of a picture is worth keeping: software renderers clear what they allocate. */
 static void picture_destroy(void *value)
 {
-	struct texture *picture = value;
-	texture_finish(picture);
+	struct picture *picture = value;
+	texture_finish(picture->spare);
+	*picture->spare = picture->texture;
 	free(picture);
 }
 
-static struct texture *picture_create(const struct scene *scene)
+static struct picture *picture_create(struct view_stage *stage, const struct scene *scene)
 {
-	struct texture *picture = calloc(1, sizeof *picture);
-	if (picture && !texture_init(picture, scene->output.width, scene->output.height, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
-		free(picture);
-		picture = NULL;
-	}
-	if (!picture)
+	struct picture *picture = calloc(1, sizeof *picture);
+	struct texture *spare = &stage->spare;
+	const int width = scene->output.width, height = scene->output.height;
+	if (!picture) {
 		log_error("view: out of memory");
+		return NULL;
+	}
+	picture->spare = spare;
+	if (spare->id && spare->width == width && spare->height == height) {
+		picture->texture = *spare;
+		*spare = (struct texture){0};
+	} else if (!texture_init(&picture->texture, width, height, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
+		free(picture);
+		return NULL;
+	}
 	return picture;
 }
 
@@ -164,8 +192,12 @@ static void bind_inputs(struct pass_run *run, enum view_side side, const struct 
 					  in->light->ground_received,
 					  in->light->cloud_received,
 					  in->field->smooth,
-					  above ? in->field->height : in->field->coarse,
-					  above ? in->field->maximum : in->field->detail};
+					  above                      ? in->field->height
+					  : in->field->coarse_packed ? in->field->coarse_packed
+								     : in->field->coarse,
+					  above                      ? in->field->maximum
+					  : in->field->detail_packed ? in->field->detail_packed
+								     : in->field->detail};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -176,16 +208,14 @@ static double horizon_sine(const struct scene_block *block, double height)
 	return h < height ? 1 : -sqrt((h - height) * (2 * radius + h + height)) / (radius + h);
 }
 
-/* What the rays of a row of pixels have in common. The sine of the elevation along a row rises and falls at most once, so its ends, its
- * middle and the point nearest to the vertical plane bound it; a margin of two pixels covers the rest. */
-static enum view_region region_of_row(const struct scene_block *block, enum view_side side, int row)
+/* Bounds of the sine of the elevation along a row of pixels. It rises and falls at most once, so the row's ends, its middle and the point
+ * nearest to the vertical plane bound it. */
+static void bound_row(const struct scene_block *block, int row, double *lowest, double *highest)
 {
 	enum { PROBES = 16 };
-	const double margin = 2 * block->camera_position[3] + 1e-6, ground = horizon_sine(block, 0);
-	/* From above, rays that miss the ground may still graze the layer. */
-	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
 	const double y = 1 - 2 * (row + 0.5) * block->image_size[3];
-	double lowest = 1, highest = -1;
+	*lowest = 1;
+	*highest = -1;
 	for (int i = 0; i <= PROBES; i++) {
 		const double x = 2.0 * i / PROBES - 1;
 		double d[3], length = 0;
@@ -194,32 +224,100 @@ static enum view_region region_of_row(const struct scene_block *block, enum view
 			       y * block->camera_up[3] * block->camera_up[k];
 			length += d[k] * d[k];
 		}
-		lowest = fmin(lowest, d[2] / sqrt(length));
-		highest = fmax(highest, d[2] / sqrt(length));
+		*lowest = fmin(*lowest, d[2] / sqrt(length));
+		*highest = fmax(*highest, d[2] / sqrt(length));
 	}
 	/* Between probes a wide row can bulge beyond them by the square of their distance. */
 	const double bulge = pow(block->camera_right[3] / PROBES, 2);
-	if (lowest - bulge > sky + margin)
-		return VIEW_SKY;
-	return highest + bulge < ground - margin ? VIEW_GROUND : VIEW_MIXED;
+	*lowest -= bulge;
+	*highest += bulge;
 }
 
-/* Runs over rows of one kind after the other, each with the program made for it. */
-static bool run_regions(struct view_stage *stage, const struct stage_context *context, struct view_variant variant, struct pass_run *run)
+/* What the rays of a row of pixels have in common, with a margin of two pixels. */
+static enum view_region region_of_row(const struct scene_block *block, enum view_side side, int row)
+{
+	const double margin = 2 * block->camera_position[3] + 1e-6, ground = horizon_sine(block, 0);
+	/* From above, rays that miss the ground may still graze the layer. */
+	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
+	double lowest, highest;
+	bound_row(block, row, &lowest, &highest);
+	if (lowest > sky + margin)
+		return VIEW_SKY;
+	return highest < ground - margin ? VIEW_GROUND : VIEW_MIXED;
+}
+
+/* Rows [first, end) that may show the sun's disc. */
+static void disc_rows(const struct scene_block *block, int *first, int *end)
+{
+	double along[3];
+	const float *axes[3] = {block->camera_up, block->camera_right, block->camera_forward};
+	for (int i = 0; i < 3; i++)
+		along[i] = (double)axes[i][0] * block->sun_direction[0] + (double)axes[i][1] * block->sun_direction[1] +
+			   (double)axes[i][2] * block->sun_direction[2];
+	*first = *end = 0;
+	if (along[2] <= 0)
+		return;
+	/* A degree of the sky is longer away from the middle, along the radius by 1/cos^2. */
+	const double row = 0.5 * block->image_size[1] * (1 - along[0] / along[2] / block->camera_up[3]);
+	const double reach = (block->sun_direction[3] / block->camera_position[3] + 1) / (along[2] * along[2]) + 1.5;
+	*first = (int)fmax(fmin(row - reach, block->image_size[1]), 0);
+	*end = (int)fmax(fmin(row + reach + 1, block->image_size[1]), 0);
+}
+
+/* Does no pixel of a row, all above the horizon, see more of the layer than a texel of its field? */
+static bool row_is_near(const struct scene_block *block, int row)
+{
+	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0];
+	double lowest, highest;
+	bound_row(block, row, &lowest, &highest);
+	const double b = (radius + h) * lowest, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
+	const double mu_v = ((radius + h) * lowest + distance) / (radius + base);
+	return mu_v > 0.01 && block->camera_position[3] * distance / sqrt(mu_v) < block->cloud_layer[2] / block->cloud_threshold[3];
+}
+
+/* Rows [first, end) up at the layer, as `run` was prepared by view_up_prepare. */
+static bool run_up(struct view_stage *stage, const struct scene_block *block, bool packed, struct pass_run *run, int first, int end)
+{
+	int disc_first, disc_end;
+	disc_rows(block, &disc_first, &disc_end);
+	for (int next; first < end; first = next) {
+		const bool near = row_is_near(block, first) && !(first >= disc_first && first < disc_end);
+		for (next = first + 1; next < end; next++)
+			if (near != (row_is_near(block, next) && !(next >= disc_first && next < disc_end)))
+				break;
+		const struct pass *pass = view_up_pass(&stage->up, packed, near);
+		if (!pass)
+			return false;
+		run->first_row = first;
+		run->height = next - first;
+		pass_run(pass, run);
+	}
+	return true;
+}
+
+/* Runs over rows of one kind after the other, each with the program made for it. `up`: how those that look up at the layer are run, or NULL
+ * for the ordinary program. */
+static bool run_regions(struct view_stage *stage, const struct stage_context *context, struct view_variant variant, struct pass_run *run,
+			struct pass_run *up)
 {
 	const int height = run->targets[0]->height;
 	run->width = run->targets[0]->width;
 	for (int first = 0; first < height;) {
 		variant.region = region_of_row(&context->block, variant.side, first);
-		const struct pass *pass = pass_of(stage, &variant);
-		if (!pass)
-			return false;
 		int end = first + 1;
 		while (end < height && region_of_row(&context->block, variant.side, end) == variant.region)
 			end++;
-		run->first_row = first;
-		run->height = end - first;
-		pass_run(pass, run);
+		if (up && variant.region == VIEW_SKY) {
+			if (!run_up(stage, &context->block, variant.packed, up, first, end))
+				return false;
+		} else {
+			const struct pass *pass = pass_of(stage, &variant);
+			if (!pass)
+				return false;
+			run->first_row = first;
+			run->height = end - first;
+			pass_run(pass, run);
+		}
 		first = end;
 	}
 	return true;
@@ -242,41 +340,62 @@ static struct view_variant variant_of(const struct stage_context *context, const
 	const enum view_side side = side_of(scene, inputs);
 	if (side == VIEW_CLEAR)
 		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers};
-	return (struct view_variant){
-		.side = side, .shading = scene->model.shading, .twilight = context->block.slab_light[1] > 0, .layers = layers};
+	return (struct view_variant){.side = side,
+				     .shading = scene->model.shading,
+				     .twilight = context->block.slab_light[1] > 0,
+				     .layers = layers,
+				     .packed = side == VIEW_BELOW && inputs->field->coarse_packed};
 }
 
-/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. */
-static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-		      const enum layer *layers, int count, const struct texture **pictures)
+/* Pictures of one kind from their regions; see renderer/stages/view_up.h for what is fast. */
+static bool run_color(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		      struct view_variant variant, struct pass_run *run)
 {
+	if (variant.side != VIEW_BELOW || variant.shading != SHADING_SOLVED)
+		return run_regions(stage, context, variant, run, NULL);
+	struct pass_run up = {.targets = run->targets, .width = run->targets[0]->width};
+	const struct view_up_inputs from = {.droplets = inputs->droplets,
+					    .slab_rows = inputs->slab_rows,
+					    .slab_slices = inputs->slab_slices,
+					    .sky = inputs->sky,
+					    .field = inputs->field,
+					    .light = inputs->light};
+	return view_up_prepare(&stage->up, context, scene, &from, &up) && run_regions(stage, context, variant, run, &up);
+}
+
+/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. alone: the color, and nothing else is wanted. */
+static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		      const enum layer *layers, int count, bool alone, const struct texture **textures)
+{
+	struct picture *pictures[VIEW_OUTPUTS] = {0};
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const struct view_variant variant = variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR);
+	const struct view_variant variant = variant_of(context, scene, inputs, !alone);
 	bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
-		targets[i] = picture_create(scene);
-		if (!targets[i])
+		pictures[i] = picture_create(stage, scene);
+		if (!pictures[i])
 			goto fail;
+		targets[i] = &pictures[i]->texture;
 	}
 	const bool whole = variant.layers || variant.twilight;
-	if (!(whole ? run_whole(stage, variant, &run) : run_regions(stage, context, variant, &run)))
+	if (!(whole ? run_whole(stage, variant, &run) : run_color(stage, context, scene, inputs, variant, &run)))
 		goto fail;
 	for (int i = 0; i < count; i++) {
-		const struct cache_key key = make_key(scene, layers[i]);
-		struct texture *picture = targets[i];
-		targets[i] = NULL;
-		if (!cache_keep(context->cache, &key, picture, texture_bytes(picture), picture_destroy))
+		const struct cache_key key = make_key(scene, layers[i], alone);
+		struct picture *picture = pictures[i];
+		pictures[i] = NULL;
+		if (!cache_keep(context->cache, &key, picture, texture_bytes(&picture->texture), picture_destroy))
 			goto fail;
-		pictures[i] = picture;
+		textures[i] = &picture->texture;
 	}
 	return true;
 
 fail:
 	for (int i = 0; i < count; i++)
-		if (targets[i])
-			picture_destroy(targets[i]);
+		if (pictures[i])
+			picture_destroy(pictures[i]);
 	return false;
 }
 
@@ -285,11 +404,14 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 		    const struct texture **pictures)
 {
 	enum layer missing[LAYER_COUNT];
+	const bool alone = count == 1 && layers[0] == LAYER_COLOR;
 	int place[LAYER_COUNT], missing_count = 0;
 	for (int i = 0; i < count; i++) {
-		const struct cache_key key = make_key(scene, layers[i]);
-		pictures[i] = cache_find(context->cache, &key);
-		if (!pictures[i]) {
+		const struct cache_key key = make_key(scene, layers[i], alone);
+		const struct picture *picture = cache_find(context->cache, &key);
+		if (picture) {
+			pictures[i] = &picture->texture;
+		} else {
 			place[missing_count] = i;
 			missing[missing_count++] = layers[i];
 		}
@@ -301,7 +423,7 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 			return false;
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
-		if (!run_group(stage, context, scene, inputs, missing + i, group, made))
+		if (!run_group(stage, context, scene, inputs, missing + i, group, alone, made))
 			return false;
 		for (int k = 0; k < group; k++)
 			pictures[place[i + k]] = made[k];
@@ -312,5 +434,5 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 
 void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)
 {
-	pass_run(stage->develop, &(struct pass_run){.targets = &target, .samplers = {picture}});
+	pass_run(stage->develop[target->format == TEXTURE_RGBA8], &(struct pass_run){.targets = &target, .samplers = {picture}});
 }

@@ -5,7 +5,7 @@
 #ifndef STRATUS_RENDERER_STAGES_VIEW_H
 #define STRATUS_RENDERER_STAGES_VIEW_H
 
-#include "renderer/stages/radiosity.h"
+#include "renderer/stages/view_up.h"
 
 /* Layers that one run of the view pass makes. */
 enum { VIEW_OUTPUTS = 4 };
@@ -23,14 +23,17 @@ struct view_variant {
 	enum shading shading;
 	bool twilight; /* the base of the layer is lit by the sun somewhere */
 	bool layers;   /* several, else the color alone */
+	bool packed;   /* the field, from below */
 };
 
 struct view_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	/* By shading, side, twilight, layers, region. Those that most pictures need are made at the start, the others with the first
-	 * picture that wants them. */
-	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS];
-	struct pass *develop;
+	/* By shading, side, twilight, layers, packed, region. Those that most pictures need are made at the start, the others with the
+	 * first picture that wants them. */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][2][VIEW_REGIONS];
+	struct view_up_stage up;
+	struct pass *develop[2]; /* into codes of 16 and of 8 bits */
+	struct texture spare;    /* of a picture that was dropped, to be used again; may be none */
 };
 
 struct view_inputs {

@@ -2,6 +2,7 @@
 #ifndef SHADERS_LIB_FIELD
 #define SHADERS_LIB_FIELD
 #include "shaders/lib/bicubic.glsl"
+#include "shaders/lib/packed.glsl"
 #include "shaders/lib/scene_block.glsl"
 
 #ifndef __cplusplus
@@ -20,20 +21,44 @@ float field_bicubic(sampler2D field, vec2 uv, float size, float lod)
 	return mix(b, a, s.share.y);
 }
 
+// Texels of the detail's side.
+const int FIELD_DETAIL_SIZE = 512;
+
+// Both pictures at a place in their tiles, at a footprint of 2^lod texels. FIELD_PACKED: the samplers hold them packed (shaders/lib/packed.glsl);
+// FIELD_NEAR: no footprint is larger than a texel of the field.
+float field_coarse_at(vec2 uv, float lod)
+{
+#if defined(FIELD_PACKED) && defined(FIELD_NEAR)
+	return packed_spline(field_coarse, uv, int(cloud_threshold.w), 0);
+#elif defined(FIELD_PACKED)
+	return packed_spline_between(field_coarse, uv, int(cloud_threshold.w), lod);
+#else
+	// From the second level on, the spline would only blur what is already small: size of the level's texels.
+	return field_bicubic(field_coarse, uv, cloud_threshold.w * exp2(-floor(lod)), lod);
+#endif
+}
+
+float field_detail_at(vec2 uv, float lod)
+{
+#ifdef FIELD_PACKED
+	return packed_linear_between(field_detail, uv, FIELD_DETAIL_SIZE, lod);
+#else
+	return textureLod(field_detail, uv, lod).x;
+#endif
+}
+
 // The field before its threshold. place: metres east and north of the tile's corner; footprint: size of the pixel there, m.
 float field_density(vec2 place, float footprint)
 {
 	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
 	float texel = cloud_layer.z / cloud_threshold.w;
 	float lod = max(0.0, log2(footprint / texel));
-	// From the second level on, the spline would only blur what is already small: size of the level's texels.
-	float size = cloud_threshold.w * exp2(-floor(lod));
-	float density = field_bicubic(field_coarse, p / cloud_layer.z, size, lod);
+	float density = field_coarse_at(p / cloud_layer.z, lod);
 	float relative = footprint * (1.0 / 30.0);
 	float fade = cloud_detail.w / (1.0 + relative * relative);
 	if (fade > 0.004)
-		density += fade * textureLod(field_detail, (p - vec2(cloud_detail.y, cloud_detail.z)) / cloud_detail.x,
-		                             max(0.0, log2(footprint * 512.0 / cloud_detail.x))).x;
+		density += fade * field_detail_at((p - vec2(cloud_detail.y, cloud_detail.z)) / cloud_detail.x,
+		                                  max(0.0, log2(footprint * float(FIELD_DETAIL_SIZE) / cloud_detail.x)));
 	return density;
 }
 

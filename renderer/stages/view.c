@@ -272,7 +272,8 @@ static bool row_is_near(const struct scene_block *block, int row)
 	bound_row(block, row, &lowest, &highest);
 	const double b = (radius + h) * lowest, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
 	const double mu_v = ((radius + h) * lowest + distance) / (radius + base);
-	return mu_v > 0.01 && block->camera_position[3] * distance / sqrt(mu_v) < block->cloud_layer[2] / block->cloud_threshold[3];
+	const double texels = fmax(block->cloud_threshold[3], 256); /* of the field's side, and of the thickness evened out */
+	return mu_v > 0.01 && block->camera_position[3] * distance / sqrt(mu_v) < block->cloud_layer[2] / texels;
 }
 
 /* Rows [first, end) up at the layer, as `run` was prepared by view_up_prepare. */

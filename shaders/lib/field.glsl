@@ -25,7 +25,7 @@ float field_bicubic(sampler2D field, vec2 uv, float size, float lod)
 const int FIELD_DETAIL_SIZE = 512;
 
 // Both pictures at a place in their tiles, at a footprint of 2^lod texels. FIELD_PACKED: the samplers hold them packed (shaders/lib/packed.glsl);
-// FIELD_NEAR: no footprint is larger than a texel of the field.
+// FIELD_NEAR: no footprint is larger than a texel of the field, or of the thickness evened out.
 float field_coarse_at(vec2 uv, float lod)
 {
 #if defined(FIELD_PACKED) && defined(FIELD_NEAR)

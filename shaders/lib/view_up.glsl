@@ -12,15 +12,13 @@ uniform sampler2D up_air;
 uniform sampler2D up_sun;
 uniform sampler2D up_first;
 uniform sampler2D up_light;
-uniform sampler2D up_share;
 uniform sampler2D smooth_packed;
 #endif
 
 // Columns over the azimuth from the sun and rows over the elevation, as those of the sky's table above the horizon; the light's table holds one such
-// picture for each depth, on each other; the share of diffuse light has depths as columns.
+// picture for each depth, on each other.
 const vec2 UP_LIGHT_SIZE = vec2(64.0, 64.0);
 const float UP_LIGHT_DEPTHS = 24.0;
-const vec2 UP_SHARE_SIZE = vec2(64.0, 64.0);
 // The first order: columns over the angle as in the residual tables, rows over the depth s as s/(s + 4).
 const vec2 UP_FIRST_SIZE = vec2(1024.0, 64.0);
 const float UP_FIRST_DEPTH = 4.0;
@@ -98,12 +96,10 @@ vec3 up_light_of(vec2 unit, float thickness)
 	return solved_multiple(0.0, thickness, vec3(1e4), ray.mu_l, ray.mu_v, slab_view_index(ray.mu_v), cos_azimuth);
 }
 
-// Of uniform diffuse light that meets droplets, the share seen through the layer at a row's elevation.
-vec3 up_share_of(float row_unit, float thickness)
+// Of uniform diffuse light that meets droplets, the share seen through the layer, in the middle band: the others' are within a percent of it.
+float up_share_of(vec2 unit, float thickness)
 {
-	float mu = up_row_sine(row_unit);
-	up_ray ray = up_ray_of(vec3(sqrt(max(1.0 - mu * mu, 0.0)), 0.0, mu));
-	return slab_diffuse_share(thickness, slab_view_index(ray.mu_v));
+	return slab_diffuse_share(thickness, slab_view_index(up_ray_of(up_direction(unit)).mu_v)).y;
 }
 
 // Phase function of the first order, over 4 pi, at a place in its table.
@@ -126,18 +122,14 @@ vec2 up_unit(vec2 air)
 	return (air * SKY_TABLE_SIZE - 0.5) / vec2(SKY_TABLE_SIZE.x - 1.0, 0.5 * SKY_TABLE_SIZE.y - 1.0);
 }
 
-vec3 up_light_at(vec2 unit, float depth_unit)
+// Light as of up_light_of, and the share as of up_share_of.
+vec4 up_light_at(vec2 unit, float depth_unit)
 {
 	float depth = depth_unit * (UP_LIGHT_DEPTHS - 1.0);
 	float low = min(floor(depth), UP_LIGHT_DEPTHS - 2.0);
 	vec2 at = unit * (UP_LIGHT_SIZE - 1.0) + vec2(0.5, 0.5 + low * UP_LIGHT_SIZE.y);
 	vec2 scale = 1.0 / (UP_LIGHT_SIZE * vec2(1.0, UP_LIGHT_DEPTHS));
-	return mix(vec3(textureLod(up_light, at * scale, 0.0)), vec3(textureLod(up_light, (at + vec2(0.0, UP_LIGHT_SIZE.y)) * scale, 0.0)), depth - low);
-}
-
-vec3 up_share_at(float row_unit, float depth_unit)
-{
-	return vec3(textureLod(up_share, (vec2(depth_unit, row_unit) * (UP_SHARE_SIZE - 1.0) + 0.5) / UP_SHARE_SIZE, 0.0));
+	return mix(textureLod(up_light, at * scale, 0.0), textureLod(up_light, (at + vec2(0.0, UP_LIGHT_SIZE.y)) * scale, 0.0), depth - low);
 }
 
 vec3 up_first_at(vec2 half_angle, float s)
@@ -161,7 +153,11 @@ vec3 up_single(vec3 tau, float mu_l, float mu_v, vec3 along_light, vec3 along_vi
 float up_smooth_thickness(vec2 place, float footprint)
 {
 	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+#ifdef FIELD_NEAR
+	return packed_linear(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), 0);
+#else
 	return packed_linear_between(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), log2(footprint * HEIGHT_SIZE_SMOOTH / cloud_layer.z));
+#endif
 }
 
 // What arrives along a ray that meets the layer from below, W/m2/nm/sr.
@@ -186,12 +182,12 @@ vec3 up_radiance(vec3 direction)
 	vec2 half_angle = scattering_half_angle(-vec3(sun_direction), -direction);
 	vec3 first = up_first_at(half_angle, solved_mean_depth(tau.y / ray.mu_l, tau.y / ray.mu_v)) *
 	             up_single(tau, ray.mu_l, ray.mu_v, along_light, along_view);
-	vec3 share = up_share_at(unit.y, depth_unit);
+	vec4 light = up_light_at(unit, depth_unit);
 	vec3 received = vec3(textureLod(cloud_received, ray.place / cloud_layer.z, 0.0));
-	vec3 diffuse = to_layer * (vec3(sky_irradiance_cloud) * share + received * (vec3(1.0) - share)) * (1.0 / PI);
+	vec3 diffuse = to_layer * (vec3(sky_irradiance_cloud) * light.w + received * (1.0 - light.w)) * (1.0 / PI);
 	vec3 met = vec3(1.0) - along_view;
 	vec3 radiance = vec3(near) + vec3(sky) * along_view + met * diffuse +
-	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * up_light_at(unit, depth_unit));
+	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * vec3(light));
 #ifndef FIELD_NEAR
 	radiance += view_sun_disc(direction) * exp(-vec3(extinction) * (thickness / ray.mu_v));
 #endif

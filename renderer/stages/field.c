@@ -350,11 +350,11 @@ static bool packed_maps_get(const struct field_stage *stage, struct stage_contex
 	add_field_inputs(&coarse, clouds);
 	add_field_inputs(&detail, clouds);
 	cache_key_add(&smooth, context->block.slab_light[2]);
-	maps->smooth_packed = packed_get(stage->pack, context, &smooth, maps->smooth);
+	maps->smooth_packed = packed_get(stage->pack, context, &smooth, maps->smooth, TEXTURE_RGBA32F);
 	if (clouds->resolution > PACKED_SIDE_MAX)
 		return maps->smooth_packed;
-	maps->coarse_packed = packed_get(stage->pack, context, &coarse, maps->coarse);
-	maps->detail_packed = packed_get(stage->pack, context, &detail, maps->detail);
+	maps->coarse_packed = packed_get(stage->pack, context, &coarse, maps->coarse, TEXTURE_RGBA32F);
+	maps->detail_packed = packed_get(stage->pack, context, &detail, maps->detail, TEXTURE_RGBA16F);
 	return maps->smooth_packed && maps->coarse_packed && maps->detail_packed;
 }
 

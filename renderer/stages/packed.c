@@ -19,11 +19,11 @@ static void packed_destroy(void *value)
 	free(packed);
 }
 
-static struct texture *packed_compute(const struct pass *pack, const struct texture *picture)
+static struct texture *packed_compute(const struct pass *pack, const struct texture *picture, enum texture_format format)
 {
 	const int side = picture->width;
 	struct texture *packed = calloc(1, sizeof *packed);
-	if (!packed || !texture_init(packed, side + side / 2, side, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
+	if (!packed || !texture_init(packed, side + side / 2, side, format, TEXTURE_NEAREST)) {
 		packed_destroy(packed);
 		return NULL;
 	}
@@ -32,13 +32,13 @@ static struct texture *packed_compute(const struct pass *pack, const struct text
 }
 
 const struct texture *packed_get(const struct pass *pack, struct stage_context *context, const struct cache_key *key,
-				 const struct texture *picture)
+				 const struct texture *picture, enum texture_format format)
 {
 	struct texture *packed = cache_find(context->cache, key);
 	if (packed)
 		return packed;
 	context->reused = false;
-	packed = packed_compute(pack, picture);
+	packed = packed_compute(pack, picture, format);
 	if (packed && cache_keep(context->cache, key, packed, texture_bytes(packed), packed_destroy))
 		return packed;
 	log_error("packed picture: out of memory");

@@ -99,6 +99,7 @@ static void layers_and_places(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(suns), cmocka_unit_test(droplets_and_cover), cmocka_unit_test(layers_and_places)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(suns), cmocka_unit_test(droplets_and_cover),
+					   cmocka_unit_test(layers_and_places)};
 	return RUN_WITH_RENDERER(tests);
 }

@@ -15,7 +15,7 @@ FROM debian:12-slim
 # libegl1 is libglvnd's: it finds NVIDIA's EGL where the container runtime brings it, else Mesa's.
 RUN apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
 		libepoxy0 libopengl0 libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio2.4 zlib1g \
-		libmicrohttpd12 libjansson4 libnova-0.16-0 libnettle8 libxxhash0 libcminpack1 libcurl4 ca-certificates \
+		libmicrohttpd12 libjansson4 libnova-0.16-0 libnettle8 libxxhash0 libcminpack1 libcurl4 libpng16-16 libopenexr-3-1-30 ca-certificates \
 	&& rm -rf /var/lib/apt/lists/* \
 	&& useradd --uid 10001 --user-group --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin stratus \
 	&& install -d -o stratus -g stratus /var/lib/stratus

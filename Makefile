@@ -23,14 +23,14 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 
 # Debian packages: to build and run, and to test. scripts/packages.sh installs those that are missing.
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
-	zlib1g-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
-TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml clang-format procps
+	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
+TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr clang-format procps
 VALIDATE_PACKAGES := gnuplot-nox
 
 pkg = $(shell pkg-config $(1) $(2))
 RENDERER_LIBS = $(call pkg,--libs,epoxy libxxhash cminpack) -lEGL -lm
 SERVER_LIBS = $(call pkg,--libs,libmicrohttpd jansson nettle) -lnova -ldl
-CLIENT_LIBS = $(call pkg,--libs,libcurl jansson)
+CLIENT_LIBS = $(call pkg,--libs,libcurl jansson libpng) -lOpenEXRCore
 
 # --- what is built from what -------------------------------------------------------------------------------------------------
 # renderer/ without its programs and its C++ is one archive; it knows no HTTP, JSON or OpenImageIO (render-bench proves it).
@@ -94,6 +94,7 @@ $(B)/renderer/image/oiio.cpp.o: renderer/image/oiio.cpp
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -fPIC $(call pkg,--cflags,OpenImageIO) -c $< -o $@
 
+$(B)/clients/image_info.c.o: CFLAGS += $(call pkg,--cflags,libpng OpenEXR)
 $(B)/renderer/optics/paper_fit_solve.c.o: CFLAGS += $(call pkg,--cflags,cminpack)
 
 # The optics are the one place where the compiler's best vector code is worth asking for: nobody there reads errno or traps.

@@ -7,5 +7,6 @@
 extern const struct command command_render;
 extern const struct command command_presets;
 extern const struct command command_health;
+extern const struct command command_info;
 
 #endif

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { CACHE_KEY_MAX = 320 };
+enum { CACHE_KEY_MAX = 512 };
 
 /* Inputs of a result. Numbers are appended as doubles, so that no padding gets in. */
 struct cache_key {

@@ -5,7 +5,7 @@
 #include "renderer/log.h"
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
-#include "renderer/stages/view.h"
+#include "renderer/stages/illuminance.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -23,6 +23,7 @@ struct renderer {
 	struct field_stage field;
 	struct radiosity_stage radiosity;
 	struct view_stage view;
+	struct illuminance_stage illuminance;
 	struct gl_timer timers[STAGE_COUNT];
 };
 
@@ -32,6 +33,7 @@ enum { DEFAULT_CACHE_BYTES = 256 << 20 };
 
 static bool compile_stages(struct renderer *renderer, const struct pass_compiler *compiler)
 {
+	illuminance_stage_init(&renderer->illuminance, compiler);
 	return ground_stage_init(&renderer->ground, compiler) && sky_stage_init(&renderer->sky, compiler) &&
 	       field_stage_init(&renderer->field, compiler) && radiosity_stage_init(&renderer->radiosity, compiler) &&
 	       view_stage_init(&renderer->view, compiler);
@@ -39,6 +41,7 @@ static bool compile_stages(struct renderer *renderer, const struct pass_compiler
 
 static void finish_stages(struct renderer *renderer)
 {
+	illuminance_stage_finish(&renderer->illuminance);
 	view_stage_finish(&renderer->view);
 	radiosity_stage_finish(&renderer->radiosity);
 	field_stage_finish(&renderer->field);
@@ -230,8 +233,13 @@ static bool run_radiosity(struct job *job)
 						   &job->maps, job->slab_rows, &job->light);
 }
 
-/* Horizontal illuminance at the camera: above the clouds by the clear sky, below them means over the tile. */
-static void fill_illuminance(struct job *job)
+/* What counts for the automatic exposure: mean horizontal illuminances over the tile, direct and diffuse, and of the beam on a plane normal
+ * to it, above the clouds; lux. Not those at the camera, since a picture must not brighten when a cloud passes before the sun. */
+struct scene_light {
+	double direct, diffuse, beam;
+};
+
+static struct scene_light scene_light_of(const struct job *job)
 {
 	const double mu = fmax(0, sin(job->scene->sun.elevation_deg * M_PI / 180));
 	const bool below = job->clouds && job->scene->camera.position_m[2] < job->scene->clouds.base_m;
@@ -241,21 +249,35 @@ static void fill_illuminance(struct job *job)
 		direct[band] = below ? job->light.ground_direct[band] : mu * (high ? job->sky.sun_cloud : job->sky.sun_ground)[band];
 		diffuse[band] = below ? job->light.ground_diffuse[band] : (high ? job->sky.diffuse_cloud : job->sky.diffuse_ground)[band];
 	}
-	job->frame->direct_illuminance_lux = colour_luminance(direct);
-	job->frame->diffuse_illuminance_lux = colour_luminance(diffuse);
-	job->frame->global_illuminance_lux = job->frame->direct_illuminance_lux + job->frame->diffuse_illuminance_lux;
+	return (struct scene_light){
+		.direct = colour_luminance(direct), .diffuse = colour_luminance(diffuse), .beam = colour_luminance(job->sky.sun_cloud)};
 }
 
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is
  * looked at. A white sheet in that light comes out at 0.5 before tone; most of a change of light is followed, as an eye does, but not all,
  * so that dusk stays darker than noon. */
-static double exposure_of(const struct scene *scene, const struct frame *frame, double beam_lux)
+static double exposure_of(const struct job *job)
 {
-	if (!scene->output.exposure_auto)
-		return scene->output.exposure_ev;
-	const double lux = fmax(0.65 * frame->diffuse_illuminance_lux + 0.45 * frame->direct_illuminance_lux + 0.08 * beam_lux, 1e-2);
+	if (!job->scene->output.exposure_auto)
+		return job->scene->output.exposure_ev;
+	const struct scene_light light = scene_light_of(job);
+	const double lux = fmax(0.65 * light.diffuse + 0.45 * light.direct + 0.08 * light.beam, 1e-2);
 	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000);
+}
+
+/* For files of scene light alone: nothing else can hold the figures. */
+static bool measure_illuminance(struct job *job, const struct view_inputs *inputs)
+{
+	struct illuminance light;
+	if (job->scene->output.format == IMAGE_PNG)
+		return true;
+	if (!illuminance_stage_run(&job->renderer->illuminance, &job->renderer->context, job->scene, inputs, &light))
+		return false;
+	job->frame->direct_illuminance_lux = colour_luminance(light.direct);
+	job->frame->diffuse_illuminance_lux = colour_luminance(light.diffuse);
+	job->frame->global_illuminance_lux = job->frame->direct_illuminance_lux + job->frame->diffuse_illuminance_lux;
+	return true;
 }
 
 static int list_layers(const struct scene *scene, enum layer *layers)
@@ -284,13 +306,14 @@ static bool run_view(struct job *job)
 					   .sky = &job->sky,
 					   .field = &job->maps,
 					   .light = job->clouds ? &job->light : NULL};
-	fill_illuminance(job);
-	frame->exposure_ev = exposure_of(job->scene, frame, colour_luminance(job->sky.sun_cloud));
+	frame->exposure_ev = exposure_of(job);
 	context->block.develop[0] = output->exposure_auto;
 	context->block.develop[1] = (float)frame->exposure_ev;
 	context->block.develop[2] = output->tone;
 	context->block.develop[3] = output->bits == 16 ? 65535 : 255;
 	stage_upload_block(context);
+	if (!measure_illuminance(job, &inputs))
+		return false;
 	frame->layer_count = list_layers(job->scene, frame->layer);
 	if (!view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
 			    job->cancel_context, job->pictures))

@@ -58,11 +58,12 @@ struct frame {
 
 	struct stage_timing timing[STAGE_COUNT];
 	int radiosity_passes;
-	double radiosity_residual;      /* relative energy left when the exchange stopped, 0 when not run */
-	double exposure_ev;             /* what multiplied the picture: 2^exposure_ev, also when automatic */
-	double global_illuminance_lux;  /* horizontal, at the camera: direct + diffuse */
-	double direct_illuminance_lux;  /* horizontal, at the camera; mean over the cloud tile below the clouds */
-	double diffuse_illuminance_lux; /* horizontal, at the camera */
+	double radiosity_residual; /* relative energy left when the exchange stopped, 0 when not run */
+	double exposure_ev;        /* what multiplied the picture: 2^exposure_ev, also when automatic */
+	/* On a horizontal plane at the camera, integrated over the hemisphere above it; EXR only, 0 otherwise. */
+	double global_illuminance_lux; /* direct + diffuse */
+	double direct_illuminance_lux; /* by the beam, through the cloud before it */
+	double diffuse_illuminance_lux;
 };
 
 struct renderer;

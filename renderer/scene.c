@@ -30,6 +30,9 @@ const char *const scene_layer_names[] = {"color",
 					 "distance",
 					 NULL};
 
+const char *const scene_path_names[] = {"sun_direct",   "order0", "order1", "order2", "multiple", "cloud_sky",
+					"cloud_ground", "sky",    "ground", "air",    NULL};
+
 struct scene scene_default(void)
 {
 	struct scene scene;
@@ -59,6 +62,7 @@ struct scene scene_default(void)
 	scene.model.name = MODEL_SLAB;
 	scene.model.shading = SHADING_SOLVED;
 	scene.model.optics = OPTICS_MIE;
+	scene.model.paths = SCENE_PATHS_ALL;
 	scene.output.width = 1024;
 	scene.output.height = 768;
 	scene.output.format = IMAGE_PNG;

@@ -59,9 +59,14 @@ enum layer {
 	LAYER_COUNT
 };
 
+/* Where the sun stands; where by_time is set, because of time and place, which no stage looks at: they go into files. */
 struct scene_sun {
 	double elevation_deg; /* -18..90 */
 	double azimuth_deg;   /* 0..360 */
+	bool by_time;
+	double julian_day;    /* universal time */
+	double latitude_deg;  /* -90..90, north */
+	double longitude_deg; /* -180..180, east */
 };
 
 /* Modified gamma droplet size distribution, N(r) = N0 / (Gamma(gamma) rn) (r/rn)^(gamma-1) exp(-r/rn), re = (gamma + 2) rn. */
@@ -115,7 +120,11 @@ struct scene_model {
 	enum model_name name;
 	enum shading shading;
 	enum optics_model optics;
+	uint32_t paths; /* kinds of light that pictures show: bit set of 1 << (layer - LAYER_SUN_DIRECT), up to LAYER_AIR; never empty */
 };
+
+/* All of them. */
+#define SCENE_PATHS_ALL ((1u << (LAYER_AIR - LAYER_SUN_DIRECT + 1)) - 1)
 
 struct scene_output {
 	int width;  /* 16..8192 */
@@ -172,5 +181,6 @@ extern const char *const scene_png_compression_names[];
 extern const char *const scene_exr_compression_names[];
 extern const char *const scene_exr_type_names[];
 extern const char *const scene_layer_names[];
+extern const char *const scene_path_names[]; /* those of the layers that color is the sum of */
 
 #endif

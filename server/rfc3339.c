@@ -1,6 +1,11 @@
 #include "server/rfc3339.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <string.h>
+
+/* Julian day of 1970-01-01T00:00:00Z. */
+#define EPOCH 2440587.5
 
 /* Two or four digits at *text, moved past. -1 when they are none. */
 static int digits(const char **text, int count)
@@ -101,6 +106,35 @@ bool rfc3339_parse(const char *text, double *julian_day)
 	/* 23:59:60 UTC reads as 86400 seconds here: the next day's midnight, which is where it belongs on a sundial. */
 	if (last == 60 && ((seconds - offset) % 86400 + 86400) % 86400 != 0)
 		return false;
-	*julian_day = 2440587.5 + (double)days_from_epoch(year, month, day) + (seconds - offset + fraction) / 86400;
-	return true;
+	const double since_epoch_ms = days_from_epoch(year, month, day) * 86400e3 + round((seconds - offset + fraction) * 1e3);
+	*julian_day = EPOCH + since_epoch_ms / 86400e3;
+	return since_epoch_ms >= days_from_epoch(0, 1, 1) * 86400e3 && since_epoch_ms < days_from_epoch(10000, 1, 1) * 86400e3;
+}
+
+/* The inverse of days_from_epoch. */
+static void date_of(long days, int *year, int *month, int *day)
+{
+	days += 719468 + 146097; /* from 1 March of the year -400 */
+	const long era = days / 146097, day_of_era = days % 146097;
+	const long year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36524 - day_of_era / 146096) / 365;
+	const long day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+	const long from_march = (5 * day_of_year + 2) / 153;
+	*day = (int)(day_of_year - (153 * from_march + 2) / 5 + 1);
+	*month = (int)(from_march < 10 ? from_march + 3 : from_march - 9);
+	*year = (int)(year_of_era + era * 400 - 400 + (*month <= 2));
+}
+
+void rfc3339_format(double julian_day, char text[static RFC3339_SIZE])
+{
+	const double ms = round((julian_day - EPOCH) * 86400e3), days = floor(ms / 86400e3);
+	const int of_day = (int)(ms - days * 86400e3);
+	int year, month, day;
+	date_of((long)days, &year, &month, &day);
+	/* The remainders only tell the compiler how many digits there can be. */
+	int length = snprintf(text, RFC3339_SIZE, "%04u-%02u-%02uT%02u:%02u:%02u", (unsigned)year % 10000, (unsigned)month % 100,
+			      (unsigned)day % 100, (unsigned)of_day / 3600000 % 100, (unsigned)of_day / 60000 % 60,
+			      (unsigned)of_day / 1000 % 60);
+	if (of_day % 1000)
+		length += snprintf(text + length, RFC3339_SIZE - (size_t)length, ".%03u", (unsigned)of_day % 1000);
+	snprintf(text + length, RFC3339_SIZE - (size_t)length, "Z");
 }

@@ -44,9 +44,10 @@ enum MHD_Result route_sun(struct request *request)
 	if (query_parse(request->query, &query, &request->problem))
 		time = read_parameters(request, &query, &input);
 	if (request->problem.kind == PROBLEM_NONE) {
-		struct scene_sun sun = sun_position_at(input.julian_day, input.latitude_deg, input.longitude_deg);
+		struct scene_sun sun = input.scene.sun;
+		sun = sun_position_at(sun.julian_day, sun.latitude_deg, sun.longitude_deg);
 		answer = json_pack("{s:f, s:f, s:s, s:f, s:f}", "elevation_deg", sun.elevation_deg, "azimuth_deg", sun.azimuth_deg, "time",
-				   time, "latitude_deg", input.latitude_deg, "longitude_deg", input.longitude_deg);
+				   time, "latitude_deg", sun.latitude_deg, "longitude_deg", sun.longitude_deg);
 	}
 	query_finish(&query);
 	return answer ? response_send_json(request, MHD_HTTP_OK, answer, CACHE_KEEP) : response_send_problem(request);

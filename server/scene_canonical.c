@@ -1,6 +1,7 @@
 #include "server/scene_canonical.h"
 
 #include "server/number_text.h"
+#include "server/rfc3339.h"
 #include "server/scene_fields.h"
 #include "server/text.h"
 
@@ -44,6 +45,7 @@ static void write_numbers(const double *numbers, int count, struct text *text)
 static void write_value(const struct scene_field *field, const struct scene_input *input, enum style style, struct text *text)
 {
 	const void *value = (const char *)input + field->offset;
+	char time[RFC3339_SIZE];
 	bool list = field->type == FIELD_NUMBERS || field->type == FIELD_CHOICES;
 	if (list && style == STYLE_JSON)
 		text_add(text, "[");
@@ -54,8 +56,11 @@ static void write_value(const struct scene_field *field, const struct scene_inpu
 		else
 			write_number(*(const double *)value, text);
 		break;
-	case FIELD_NUMBER:
 	case FIELD_TIME:
+		rfc3339_format(*(const double *)value, time);
+		write_word(time, style, text);
+		break;
+	case FIELD_NUMBER:
 		write_number(*(const double *)value, text);
 		break;
 	case FIELD_NUMBERS:
@@ -89,6 +94,12 @@ static bool is_meaningful(const struct scene_field *field, const struct scene *s
 {
 	if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER))
 		return false;
+	if (strcmp(field->section, "sun") == 0) {
+		const bool is_angle = strcmp(field->name, "elevation_deg") == 0 || strcmp(field->name, "azimuth_deg") == 0;
+		return is_angle != scene->sun.by_time;
+	}
+	if (strcmp(field->section, "model") == 0 && strcmp(field->name, "paths") == 0)
+		return scene->model.paths != SCENE_PATHS_ALL;
 	if (strcmp(field->section, "ground") == 0 && strcmp(field->name, "albedo") == 0)
 		return scene->ground.type == GROUND_LAMBERT;
 	return true;
@@ -130,7 +141,9 @@ char *scene_canonical_query(const struct scene *scene)
 		struct text value = {0}, usual = {0};
 		write_value(field, &input, STYLE_QUERY, &value);
 		write_value(field, &defaults, STYLE_QUERY, &usual);
-		bool differs = value.failed || usual.failed || strcmp(value.data, usual.data) != 0;
+		/* Time and place stand together or not at all. */
+		bool differs = value.failed || usual.failed || strcmp(value.data, usual.data) != 0 ||
+			       (scene->sun.by_time && strcmp(field->section, "sun") == 0);
 		if (is_meaningful(field, scene) && differs)
 			text_printf(&text, "%s%s.%s=%s", text.length ? "&" : "", field->section, field->name,
 				    value.failed ? "" : value.data);

@@ -1,7 +1,8 @@
 /* The canonical form of a scene, and what is derived from it. Any thread.
  *
  * Canonical: JSON without white space, every member with its value, in the order of scene_fields.h, numbers as short as they read back
- * exactly. Two requests mean the same picture when their canonical forms are equal; reading the form gives the form again.
+ * exactly. Two requests mean the same picture when their canonical forms are equal; reading the form gives the form again. A sun given by
+ * time and place stays so (in universal time), since files say both.
  */
 #ifndef STRATUS_SERVER_SCENE_CANONICAL_H
 #define STRATUS_SERVER_SCENE_CANONICAL_H

@@ -10,9 +10,9 @@
 const struct scene_field scene_fields[] = {
 	{"sun", "elevation_deg", FIELD_NUMBER, AT(scene.sun.elevation_deg), BETWEEN(-18, 90)},
 	{"sun", "azimuth_deg", FIELD_NUMBER, AT(scene.sun.azimuth_deg), BETWEEN(0, 360)},
-	{"sun", "time", FIELD_TIME, AT(julian_day), .flags = FIELD_INPUT_ONLY},
-	{"sun", "latitude_deg", FIELD_NUMBER, AT(latitude_deg), BETWEEN(-90, 90), .flags = FIELD_INPUT_ONLY},
-	{"sun", "longitude_deg", FIELD_NUMBER, AT(longitude_deg), BETWEEN(-180, 180), .flags = FIELD_INPUT_ONLY},
+	{"sun", "time", FIELD_TIME, AT(scene.sun.julian_day)},
+	{"sun", "latitude_deg", FIELD_NUMBER, AT(scene.sun.latitude_deg), BETWEEN(-90, 90)},
+	{"sun", "longitude_deg", FIELD_NUMBER, AT(scene.sun.longitude_deg), BETWEEN(-180, 180)},
 
 	{"dsd", "n0_per_cm3", FIELD_NUMBER, AT(scene.dsd.n0_per_cm3), BETWEEN(1, 5000)},
 	{"dsd", "gamma", FIELD_NUMBER, AT(scene.dsd.gamma), BETWEEN(1, 20)},
@@ -58,6 +58,7 @@ const struct scene_field scene_fields[] = {
 	 .choices_later = LATER(MODEL_REFERENCE) | LATER(MODEL_VOLUME) | LATER(MODEL_PLANAR)},
 	{"model", "shading", FIELD_CHOICE, AT(scene.model.shading), .choices = scene_shading_names},
 	{"model", "optics", FIELD_CHOICE, AT(scene.model.optics), .choices = scene_optics_names},
+	{"model", "paths", FIELD_CHOICES, AT(scene.model.paths), .choices = scene_path_names},
 
 	{"output", "width", FIELD_INTEGER, AT(scene.output.width), BETWEEN(16, 8192)},
 	{"output", "height", FIELD_INTEGER, AT(scene.output.height), BETWEEN(16, 8192)},

@@ -47,8 +47,6 @@ struct scene_field {
  * given. */
 struct scene_input {
 	struct scene scene;
-	double julian_day; /* universal time */
-	double latitude_deg, longitude_deg;
 	double characteristic_radius_um;
 	char face[SCENE_NAME_MAX];
 	uint64_t given; /* bit i: scene_fields[i] was given, valid or not */

@@ -39,12 +39,13 @@ static void resolve_sun(struct scene_input *input, struct problem *problem)
 	}
 	if (problem_mentions(problem, "/sun"))
 		return;
-	struct scene_sun sun = sun_position_at(input->julian_day, input->latitude_deg, input->longitude_deg);
+	struct scene_sun *given_sun = &input->scene.sun;
+	struct scene_sun sun = sun_position_at(given_sun->julian_day, given_sun->latitude_deg, given_sun->longitude_deg);
 	if (sun.elevation_deg < scene_field_find("sun", "elevation_deg")->range[0].low)
 		problem_add(problem, "/sun/time", "the sun is %.1f degrees below the horizon then and there: at most 18",
 			    -sun.elevation_deg);
 	else
-		input->scene.sun = sun;
+		*given_sun = sun;
 }
 
 static void resolve_dsd(struct scene_input *input, struct problem *problem)

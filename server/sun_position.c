@@ -29,6 +29,9 @@ static struct ln_equ_posn sun_equatorial(double jde)
 	struct ln_equ_posn j2000, mean;
 	struct ln_lnlat_posn ecliptic;
 	ln_get_solar_geom_coords(jde, &geometric);
+	/* libnova takes the nutation of its last call again when that was less than 0.1 days apart; the same time must give the same
+	 * position whatever was asked before, to the last bit. */
+	ln_get_nutation(jde + 1000, &nutation);
 	ln_get_nutation(jde, &nutation);
 	ln_get_equ_from_ecl(&(struct ln_lnlat_posn){.lng = geometric.L, .lat = geometric.B}, JD2000, &j2000);
 	ln_get_equ_prec(&j2000, jde, &mean);
@@ -57,6 +60,10 @@ struct scene_sun sun_position_at(double julian_day, double latitude_deg, double 
 	double up = sin(declination) * sin(latitude) + cos(declination) * cos(hour_angle) * cos(latitude);
 	double azimuth = atan2(east, north) / RADIANS;
 	return (struct scene_sun){
+		.by_time = true,
+		.julian_day = julian_day,
+		.latitude_deg = latitude_deg,
+		.longitude_deg = longitude_deg,
 		.elevation_deg = atan2(up, hypot(east, north)) / RADIANS - SUN_PARALLAX_DEG * hypot(east, north),
 		.azimuth_deg = azimuth < 0 ? azimuth + 360 : azimuth,
 	};

@@ -5,7 +5,7 @@
 #include "renderer/scene.h"
 
 /* julian_day: universal time. latitude_deg -90..90 north, longitude_deg -180..180 east. Topocentric (with the sun's parallax), geometric:
- * not refracted. Elevation -90..90, azimuth 0..360 clockwise from north. */
+ * not refracted; time and place come along. Elevation -90..90, azimuth 0..360 clockwise from north. */
 struct scene_sun sun_position_at(double julian_day, double latitude_deg, double longitude_deg);
 
 #endif

@@ -17,6 +17,7 @@ extern "C" {
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -237,6 +238,23 @@ void describe_projection(ImageSpec &spec, const struct scene &scene)
 	}
 }
 
+/* When and where the picture was "taken": the scene's own time and place, never those of the machine. */
+void describe_time_and_place(ImageSpec &spec, const struct scene_sun &sun)
+{
+	/* OpenImageIO adds the date unless there is one; one that is no text keeps it out and is itself not written. */
+	spec.attribute("DateTime", 0);
+	if (!sun.by_time)
+		return;
+	const std::time_t seconds = static_cast<std::time_t>(std::floor((sun.julian_day - 2440587.5) * 86400 + 5e-4));
+	std::tm date;
+	char text[sizeof "2003:10:17 19:30:30"];
+	require(gmtime_r(&seconds, &date) && std::strftime(text, sizeof text, "%Y:%m:%d %H:%M:%S", &date) > 0, "the time has no date");
+	spec.attribute("DateTime", text);
+	spec.attribute("utcOffset", 0.0f);
+	spec.attribute("latitude", static_cast<float>(sun.latitude_deg));
+	spec.attribute("longitude", static_cast<float>(sun.longitude_deg));
+}
+
 ImageSpec exr_spec(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata,
 		   const std::vector<channel> &channels, bool clamped)
 {
@@ -249,10 +267,11 @@ ImageSpec exr_spec(const struct frame &frame, const struct scene &scene, const s
 	const float rec709_d65[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
 	spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), rec709_d65);
 	spec.attribute("whiteLuminance", 1000.0f); /* cd/m2 of (1,1,1) */
+	spec.attribute("adoptedNeutral", TypeDesc(TypeDesc::FLOAT, TypeDesc::VEC2), rec709_d65 + 6);
 	spec.attribute("compression", scene_exr_compression_names[scene.output.exr_compression]);
 	spec.attribute("software", metadata.software);
-	/* OpenImageIO adds the date unless there is one; one that is no text keeps it out and is itself not written. */
-	spec.attribute("DateTime", 0);
+	describe_time_and_place(spec, scene.sun);
+	spec.attribute("altitude", static_cast<float>(scene.camera.position_m[2]));
 	describe_projection(spec, scene);
 	spec.attribute("stratus:scene", metadata.scene_json);
 	spec.attribute("stratus:exposure_ev", static_cast<float>(frame.exposure_ev));

@@ -120,8 +120,11 @@ static void print_timing(const char *name, const struct frame *frame, double wal
 	printf("%-16s", name);
 	for (int i = 0; i < STAGE_COUNT; i++)
 		printf(" %s %.2f%s", stage_names[i], frame->timing[i].milliseconds, frame->timing[i].reused ? "*" : "");
-	printf(" wall %.2f ms, processor %.2f ms (passes %d, residual %.1e, %.0f lux, EV %.2f)\n", wall, processor, frame->radiosity_passes,
-	       frame->radiosity_residual, frame->global_illuminance_lux, frame->exposure_ev);
+	printf(" wall %.2f ms, processor %.2f ms (passes %d, residual %.1e, EV %.2f", wall, processor, frame->radiosity_passes,
+	       frame->radiosity_residual, frame->exposure_ev);
+	if (frame->type == PIXEL_F32)
+		printf(", %.0f + %.0f lux", frame->direct_illuminance_lux, frame->diffuse_illuminance_lux);
+	puts(")");
 }
 
 static bool render(struct renderer *renderer, const struct scene *scene, const char *name, const char *path)

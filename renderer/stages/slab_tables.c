@@ -150,7 +150,7 @@ static void solved_fill_shares(const struct rows *rows, int band)
 
 static bool wants_layers(const struct scene *scene)
 {
-	return scene->output.layers != 1u << LAYER_COLOR;
+	return scene->output.layers != 1u << LAYER_COLOR || scene->model.paths != SCENE_PATHS_ALL;
 }
 
 static void fill(const struct rows *rows)

@@ -26,11 +26,10 @@ static const struct pass_desc develop_descs[2] = {
 	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 1\n", .outputs = 1, .samplers = {"picture"}},
 };
 
-static struct pass *create_pass(const struct pass_compiler *compiler, const struct view_variant *variant)
+struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
 	char defines[256];
-	const int outputs = variant->layers ? VIEW_OUTPUTS : 1;
-	struct pass_desc desc = {.file = "shaders/passes/view.glsl", .defines = defines, .outputs = outputs};
+	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n",
 		 sides[variant->side].defines, variant->packed ? "#define FIELD_PACKED 1\n" : "", variant->region,
@@ -45,7 +44,7 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 	struct pass **pass =
 		&stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->packed][variant->region];
 	if (!*pass)
-		*pass = create_pass(&stage->compiler, variant);
+		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
 }
 
@@ -125,7 +124,8 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer, bo
 				 camera->elevation_deg,
 				 camera->roll_deg,
 				 camera->vertical_fov_deg,
-				 camera->projection};
+				 camera->projection,
+				 scene->model.paths};
 	struct cache_key key = cache_key_make("view");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
@@ -176,7 +176,7 @@ static enum view_side side_of(const struct scene *scene, const struct view_input
 }
 
 /* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
-static void bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
+void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
 {
 	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,     in->sky->to_layer,
 					  in->sky->to_end,        in->ground->map, in->ground->relief};
@@ -335,8 +335,8 @@ static bool run_whole(struct view_stage *stage, struct view_variant variant, con
 }
 
 /* A clear sky has neither shading nor a layer to be lit from below. */
-static struct view_variant variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-				      bool layers)
+struct view_variant view_variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+				    bool layers)
 {
 	const enum view_side side = side_of(scene, inputs);
 	if (side == VIEW_CLEAR)
@@ -364,15 +364,17 @@ static bool run_color(struct view_stage *stage, struct stage_context *context, c
 	return view_up_prepare(&stage->up, context, scene, &from, &up) && run_regions(stage, context, variant, run, &up);
 }
 
-/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. alone: the color, and nothing else is wanted. */
+/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. alone: the color of all paths, and nothing else, is wanted. */
 static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
 		      const enum layer *layers, int count, bool alone, const struct texture **textures)
 {
 	struct picture *pictures[VIEW_OUTPUTS] = {0};
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const struct view_variant variant = variant_of(context, scene, inputs, !alone);
-	bind_inputs(&run, variant.side, inputs);
+	const struct view_variant variant = view_variant_of(context, scene, inputs, !alone);
+	for (int i = 0; i <= LAYER_AIR - LAYER_SUN_DIRECT; i++)
+		run.arguments[1 + i / 4][i % 4] = (float)(scene->model.paths >> i & 1);
+	view_bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
 		pictures[i] = picture_create(stage, scene);
@@ -405,7 +407,7 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 		    const struct texture **pictures)
 {
 	enum layer missing[LAYER_COUNT];
-	const bool alone = count == 1 && layers[0] == LAYER_COLOR;
+	const bool alone = count == 1 && layers[0] == LAYER_COLOR && scene->model.paths == SCENE_PATHS_ALL;
 	int place[LAYER_COUNT], missing_count = 0;
 	for (int i = 0; i < count; i++) {
 		const struct cache_key key = make_key(scene, layers[i], alone);

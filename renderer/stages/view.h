@@ -57,6 +57,13 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 		    const enum layer *layers, int count, renderer_cancelled *cancelled, void *cancel_context,
 		    const struct texture **pictures);
 
+/* For other passes that follow viewing rays (shaders/lib/view.glsl): the program of a file in the form for `variant`, with samplers as
+ * view_bind_inputs binds them; NULL after log lines. And the form that a frame needs. */
+struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant);
+struct view_variant view_variant_of(const struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+				    bool layers);
+void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *inputs);
+
 /* Exposure, tone and sRGB of a picture into `target` (RGBA8 or RGBA16). Reads the block's develop member. */
 void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target);
 

@@ -1,6 +1,21 @@
-// The view stage: the color, or parts of the picture, chosen by `arguments`: for output i the layer arguments[i / 4][i % 4] (enum layer).
+// The view stage: the color, or parts of the picture, chosen by `arguments`: for output i the layer arguments[0][i] (enum layer), and from arguments[1] on the shares
+// (0 or 1) of the color's ten summands that are shown.
 #include "shaders/lib/view.glsl"
 #include "shaders/lib/colour.glsl"
+
+void view_show_paths(INOUT(view_parts) p)
+{
+	p.sun_direct *= arguments[1].x;
+	p.order0 *= arguments[1].y;
+	p.order1 *= arguments[1].z;
+	p.order2 *= arguments[1].w;
+	p.multiple *= arguments[2].x;
+	p.cloud_sky *= arguments[2].y;
+	p.cloud_ground *= arguments[2].z;
+	p.sky *= arguments[2].w;
+	p.ground *= arguments[3].x;
+	p.air *= arguments[3].y;
+}
 
 vec3 view_layer(view_parts p, int layer)
 {
@@ -28,6 +43,7 @@ void pass(ivec2 pixel)
 #if VIEW_COLOR_ONLY
 	STORE(0, vec4(colour_of_bands(view_sum(parts)), 1.0));
 #else
+	view_show_paths(parts);
 	STORE(0, vec4(view_layer(parts, int(arguments[0].x)), 1.0));
 	STORE(1, vec4(view_layer(parts, int(arguments[0].y)), 1.0));
 	STORE(2, vec4(view_layer(parts, int(arguments[0].z)), 1.0));

@@ -570,7 +570,8 @@ def test_load(start_daemon):
         assert daemon.render({"output": {"width": 64, "height": 48}}).status == 200
         assert daemon.get(target(optical_thickness=1)).status == 200
         assert all(request.result().status == 504 for request in waiting)
-    assert daemon.metric("stratus_tracings_waiting") == 0 and daemon.metric("stratus_requests_in_flight") == 2
+    assert daemon.metric("stratus_tracings_waiting") == 0
+    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2)
     running.setblocking(False)
     with pytest.raises(BlockingIOError):
         running.recv(1)

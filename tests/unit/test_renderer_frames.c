@@ -63,7 +63,7 @@ static struct scene random_scene(void)
 	static const enum cloud_type types[] = {CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_NONE};
 	static const enum ground_type grounds[] = {GROUND_COUNTRY, GROUND_SEA, GROUND_SEA_ICE, GROUND_SNOW, GROUND_BLACK, GROUND_LAMBERT};
 	struct scene scene = small_scene(64, 48, (1u << LAYER_COUNT) - 1);
-	scene.sun = (struct scene_sun){uniform(-18, 90), uniform(0, 360)};
+	scene.sun = (struct scene_sun){.elevation_deg = uniform(-18, 90), .azimuth_deg = uniform(0, 360)};
 	scene.dsd = (struct scene_dsd){spread(1, 5000), spread(1, 20), spread(1, 30)};
 	scene.clouds.type = types[one_of(8) % 3];
 	scene.clouds.seed = (uint32_t)uniform(0, 4294967295.0);
@@ -106,6 +106,38 @@ static void check_values(int number, const struct frame *frame)
 	assert_true(isfinite(frame->exposure_ev) && isfinite(frame->radiosity_residual));
 	assert_true(frame->direct_illuminance_lux >= 0 && frame->diffuse_illuminance_lux >= 0);
 	assert_true(frame->global_illuminance_lux < 200000);
+}
+
+/* A picture of one kind of light alone is that layer of the whole picture; of all but one, the difference. */
+static void paths_are_layers(void **state)
+{
+	(void)state;
+	struct scene scene = small_scene(64, 48, (1u << LAYER_COUNT) - 1);
+	scene.clouds.coverage = 0.6;
+	struct frame whole = render(&scene);
+	for (int layer = LAYER_SUN_DIRECT; layer <= LAYER_AIR; layer++) {
+		const uint32_t path = 1u << (layer - LAYER_SUN_DIRECT);
+		scene.output.layers = LAYER(COLOR);
+		scene.model.paths = path;
+		struct frame alone = render(&scene);
+		scene.output.layers = LAYER(COLOR) | 1u << layer;
+		scene.model.paths = SCENE_PATHS_ALL & ~path;
+		struct frame without = render(&scene);
+		for (int y = 0; y < 48; y++)
+			for (int x = 0; x < 64; x++)
+				for (int c = 0; c < 3; c++) {
+					const double all = pixel_of(&whole, LAYER_COLOR, x, y)[c];
+					const double part = pixel_of(&whole, (enum layer)layer, x, y)[c];
+					assert_float_equal(pixel_of(&alone, LAYER_COLOR, x, y)[c], part, 1e-4 * fabs(part) + 1e-6);
+					assert_float_equal(pixel_of(&without, LAYER_COLOR, x, y)[c], all - part,
+							   1e-5 * (fabs(all) + fabs(part)));
+					assert_true(pixel_of(&without, (enum layer)layer, x, y)[c] == 0);
+				}
+		assert_true(alone.exposure_ev == whole.exposure_ev && alone.global_illuminance_lux == whole.global_illuminance_lux);
+		frame_finish(&without);
+		frame_finish(&alone);
+	}
+	frame_finish(&whole);
 }
 
 static void random_scenes_are_sane(void **state)
@@ -239,9 +271,8 @@ static void cancelling_stops(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(layers_add_up_to_color), cmocka_unit_test(random_scenes_are_sane),
-		cmocka_unit_test(memory_changes_nothing), cmocka_unit_test(types_of_pixels),
-		cmocka_unit_test(cancelling_stops),
+		cmocka_unit_test(layers_add_up_to_color), cmocka_unit_test(random_scenes_are_sane), cmocka_unit_test(paths_are_layers),
+		cmocka_unit_test(memory_changes_nothing), cmocka_unit_test(types_of_pixels),        cmocka_unit_test(cancelling_stops),
 	};
 	return RUN_WITH_RENDERER(tests);
 }

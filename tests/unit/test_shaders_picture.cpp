@@ -269,6 +269,8 @@ static picture render_cpu(int variant, const made &out)
 	picture picture;
 	copy_textures(out);
 	glsl::set_scene_block(shared.context.block);
+	for (int i = 1; i < 4; i++)
+		glsl::arguments[i] = glsl::vec4(1.0f); /* all paths are shown */
 	for (int i = 0; i < LAYERS; i++) {
 		glsl::arguments[0].x = (float)layers[i];
 		for (int y = 0; y < HEIGHT; y++)

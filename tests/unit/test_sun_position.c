@@ -53,10 +53,40 @@ static void test_times(void **state)
 					  "2000-01-01T12:00:00+24:00",
 					  "2000-01-01T12:00:00ZZ",
 					  "+2000-01-01T12:00:00Z",
-					  "99999-01-01T12:00:00Z"};
+					  "99999-01-01T12:00:00Z",
+					  "0000-01-01T00:00:00+01:00",
+					  "9999-12-31T23:59:59-01:00"};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
 		if (rfc3339_parse(bad[i], &julian_day))
 			fail_msg("%s is taken", bad[i]);
+}
+
+static void test_time_texts(void **state)
+{
+	(void)state;
+	static const char *const cases[][2] = {
+		{"2003-10-17T12:30:30-07:00", "2003-10-17T19:30:30Z"},   {"2003-10-17T19:30:30.5Z", "2003-10-17T19:30:30.500Z"},
+		{"2000-02-29T23:59:59.9996Z", "2000-03-01T00:00:00Z"},   {"2016-12-31T23:59:60Z", "2017-01-01T00:00:00Z"},
+		{"0000-01-01T00:00:00Z", "0000-01-01T00:00:00Z"},        {"1969-12-31T23:59:59.001Z", "1969-12-31T23:59:59.001Z"},
+		{"9999-12-31T23:59:59.999Z", "9999-12-31T23:59:59.999Z"}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		double first, second;
+		char text[RFC3339_SIZE];
+		assert_true(rfc3339_parse(cases[i][0], &first));
+		rfc3339_format(first, text);
+		assert_string_equal(text, cases[i][1]);
+		assert_true(rfc3339_parse(text, &second));
+		assert_true(first == second);
+	}
+	/* Every day of four centuries. */
+	for (int day = 0; day < 146097; day++) {
+		const double julian_day = 2305447.5 + day + (day % 86400) / 86400.0;
+		double back;
+		char text[RFC3339_SIZE];
+		rfc3339_format(julian_day, text);
+		assert_true(rfc3339_parse(text, &back));
+		assert_float_equal(back, julian_day, 1e-8);
+	}
 }
 
 static struct scene_sun sun_at(const char *time, double latitude, double longitude)
@@ -106,10 +136,8 @@ static void test_directions(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_times),
-		cmocka_unit_test(test_spa_example),
-		cmocka_unit_test(test_seasons),
-		cmocka_unit_test(test_directions),
+		cmocka_unit_test(test_times),   cmocka_unit_test(test_time_texts), cmocka_unit_test(test_spa_example),
+		cmocka_unit_test(test_seasons), cmocka_unit_test(test_directions),
 	};
 	return cmocka_run_group_tests_name("sun_position", tests, NULL, NULL);
 }

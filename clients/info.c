@@ -1,0 +1,115 @@
+/* stratus info FILE: what an image says of itself; its scene, to render it again. Needs no daemon. */
+#include "clients/commands.h"
+#include "clients/image_info.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { AS_SCENE = 's', AS_JSON = 'j' };
+enum { NAME_WIDTH = 32 };
+
+/* Files may hold anything; a terminal gets no control characters from them. */
+static void print_plain(const char *text)
+{
+	for (; *text; text++)
+		putchar((unsigned char)*text < 0x20 || *text == 0x7f ? ' ' : *text);
+}
+
+static void print_name(const char *name)
+{
+	print_plain(name);
+	printf("%*s ", (int)(strlen(name) < NAME_WIDTH ? NAME_WIDTH - strlen(name) : 0), "");
+}
+
+static void print_value(const char *name, const json_t *value)
+{
+	size_t i;
+	json_t *element;
+	print_name(name);
+	if (json_is_string(value))
+		print_plain(json_string_value(value));
+	else if (json_is_number(value))
+		printf("%.7g", json_number_value(value));
+	json_array_foreach(value, i, element) printf("%s%.6g", i ? " " : "", json_number_value(element));
+	putchar('\n');
+}
+
+static void print_channels(const json_t *channels)
+{
+	size_t i;
+	json_t *name;
+	print_name("channels");
+	if (json_is_integer(channels))
+		printf("%lld", (long long)json_integer_value(channels));
+	json_array_foreach(channels, i, name)
+	{
+		print_plain(i ? " " : "");
+		print_plain(json_string_value(name));
+	}
+	putchar('\n');
+}
+
+static void print_text(json_t *info)
+{
+	const char *name;
+	json_t *value;
+	print_name("image");
+	printf("%s, %lld x %lld\n", json_string_value(json_object_get(info, "format")),
+	       (long long)json_integer_value(json_object_get(info, "width")),
+	       (long long)json_integer_value(json_object_get(info, "height")));
+	print_channels(json_object_get(info, "channels"));
+	json_object_foreach(json_object_get(info, "attributes"), name, value) print_value(name, value);
+	if (json_object_get(info, "scene")) {
+		print_name("stratus:scene");
+		json_dumpf(json_object_get(info, "scene"), stdout, JSON_INDENT(2) | JSON_ENSURE_ASCII);
+		putchar('\n');
+	}
+}
+
+static int print(json_t *info, int form, const char *path)
+{
+	const json_t *scene = json_object_get(info, "scene");
+	if (form == AS_SCENE && !scene) {
+		client_error("%s: holds no scene", path);
+		return CLIENT_USAGE;
+	}
+	if (form)
+		json_dumpf(form == AS_SCENE ? scene : info, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)), putchar('\n');
+	else
+		print_text(info);
+	return fflush(stdout) == 0 && !ferror(stdout) ? CLIENT_OK : CLIENT_UNWRITABLE;
+}
+
+static int run_info(struct client *client, int argc, char **argv)
+{
+	static const struct option options[] = {
+		{"scene", no_argument, NULL, AS_SCENE}, {"json", no_argument, NULL, AS_JSON}, CLIENT_LONG_OPTIONS, {0}};
+	int form = 0;
+	for (int option; (option = getopt_long(argc, argv, CLIENT_SHORT_OPTIONS, options, NULL)) != -1;) {
+		if (option == AS_SCENE || option == AS_JSON) {
+			form = option;
+			continue;
+		}
+		const int end = client_option(client, option);
+		if (end >= 0)
+			return end;
+	}
+	if (argc - optind != 1) {
+		client_error("info takes one image file");
+		return CLIENT_USAGE;
+	}
+	json_t *info = image_info_read(argv[optind]);
+	const int status = info ? print(info, form, argv[optind]) : CLIENT_USAGE;
+	json_decref(info);
+	return status;
+}
+
+const struct command command_info = {
+	.name = "info",
+	.arguments = "FILE",
+	.summary = "tell what an image file says of itself",
+	.help = "Reads the header alone, and asks no daemon.\n\n"
+		"  --scene  print the scene in it, as JSON: stratus info --scene sky.exr | stratus render - -o again.exr\n"
+		"  --json   print everything as JSON\n",
+	.run = run_info,
+};

@@ -1,6 +1,7 @@
 #include "renderer/stages/ground.h"
 
 #include "renderer/log.h"
+#include "renderer/scene_map.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -54,7 +55,27 @@ static void paint(const struct pass *pass, struct texture *texture)
 	texture_build_mipmaps(texture);
 }
 
-static struct ground *ground_compute(const struct ground_stage *stage, int side)
+/* A map's reflectance, scaled. */
+static bool upload_map(const struct scene_ground *ground, struct texture *texture)
+{
+	const size_t count = (size_t)texture->width * (size_t)texture->width;
+	float *texels = scene_map_texels(ground->map.map, texture->width), *padded = malloc(4 * count * sizeof *padded);
+	for (size_t i = 0; texels && padded && i < count; i++) {
+		for (size_t band = 0; band < 3; band++)
+			padded[4 * i + band] = (float)ground->albedo_scale * texels[3 * i + band];
+		padded[4 * i + 3] = 1;
+	}
+	const bool ok = texels && padded;
+	if (ok)
+		texture_upload(texture, padded);
+	free(padded);
+	free(texels);
+	if (ok)
+		texture_build_mipmaps(texture);
+	return ok;
+}
+
+static struct ground *ground_compute(const struct ground_stage *stage, const struct scene_ground *scene, int side)
 {
 	struct ground *ground = calloc(1, sizeof *ground);
 	if (!ground)
@@ -64,7 +85,12 @@ static struct ground *ground_compute(const struct ground_stage *stage, int side)
 		ground_destroy(ground);
 		return NULL;
 	}
-	paint(stage->passes[PASS_PAINT], &ground->map);
+	if (!scene->map.map) {
+		paint(stage->passes[PASS_PAINT], &ground->map);
+	} else if (!upload_map(scene, &ground->map)) {
+		ground_destroy(ground);
+		return NULL;
+	}
 	paint(stage->passes[PASS_RELIEF], &ground->relief);
 	float mean[4];
 	stage_read_texture(&ground->map, ground->map.levels - 1, 4, mean);
@@ -84,20 +110,33 @@ static void fill_block(struct scene_block *block, const struct scene *scene, int
 	block->ground_patch[1] = (float)types[scene->ground.type].relief;
 }
 
+/* Texels a side of the picture. */
+static int side_of(const struct scene_ground *ground)
+{
+	const struct scene_map *map = ground->map.map;
+	int side = UNIFORM_SIDE;
+	if (!map)
+		return types[ground->type].picture ? PICTURE_SIDE : UNIFORM_SIDE;
+	while (side < SCENE_MAP_GROUND_SIDE && (side < map->width || side < map->height))
+		side *= 2;
+	return side;
+}
+
 bool ground_stage_run(const struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps)
 {
-	const int side = types[scene->ground.type].picture ? PICTURE_SIDE : UNIFORM_SIDE;
+	const int side = side_of(&scene->ground);
 	fill_block(&context->block, scene, side);
 	const double inputs[] = {scene->ground.type,      scene->ground.albedo_scale, scene->ground.albedo[0],
 				 scene->ground.albedo[1], scene->ground.albedo[2],    scene->clouds.tile_m};
 	struct cache_key key = cache_key_make("ground");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);
+	stage_key_add_map(&key, scene->ground.map.map);
 	struct ground *ground = cache_find(context->cache, &key);
 	if (!ground) {
 		context->reused = false;
 		stage_upload_block(context);
-		ground = ground_compute(stage, side);
+		ground = ground_compute(stage, &scene->ground, side);
 		if (!ground || !cache_keep(context->cache, &key, ground, texture_bytes(&ground->map) + texture_bytes(&ground->relief),
 					   ground_destroy)) {
 			log_error("ground: out of memory");

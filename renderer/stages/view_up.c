@@ -21,12 +21,12 @@ static const struct pass_desc first_desc = {
 static const struct pass_desc light_desc = {
 	.file = "shaders/passes/view_up_light.glsl", .defines = DEFINES, .outputs = 1, .samplers = {"slab_slices", "slab_table"}};
 
-const struct pass *view_up_pass(struct view_up_stage *stage, bool packed, bool near)
+const struct pass *view_up_pass(struct view_up_stage *stage, enum projection projection, bool packed, bool near, bool large_sun)
 {
-	struct pass **pass = &stage->look[packed][near];
+	struct pass **pass = &stage->look[projection][packed][near][large_sun];
 	char defines[512];
-	snprintf(defines, sizeof defines, "%s%s%s", DEFINES, packed ? "#define FIELD_PACKED 1\n" : "",
-		 near ? "#define FIELD_NEAR 1\n" : "");
+	snprintf(defines, sizeof defines, "%s%s%s#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n", DEFINES,
+		 packed ? "#define FIELD_PACKED 1\n" : "", near ? "#define FIELD_NEAR 1\n" : "", projection, large_sun);
 	if (!*pass)
 		*pass = pass_create(&stage->compiler,
 				    &(struct pass_desc){.file = "shaders/passes/view_up.glsl",
@@ -44,7 +44,8 @@ bool view_up_init(struct view_up_stage *stage, const struct pass_compiler *compi
 		  (stage->light = pass_create(compiler, &light_desc));
 	for (int i = 0; ok && i < VIEW_UP_AIR_TABLES; i++)
 		ok = texture_init(&stage->air_tables[i], AIR_WIDTH, AIR_HEIGHT, TEXTURE_RGBA32F, 0);
-	ok = ok && view_up_pass(stage, true, false) && view_up_pass(stage, true, true);
+	ok = ok && view_up_pass(stage, PROJECTION_PERSPECTIVE, true, false, false) &&
+	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, true, false);
 	if (!ok)
 		view_up_finish(stage);
 	return ok;
@@ -52,8 +53,9 @@ bool view_up_init(struct view_up_stage *stage, const struct pass_compiler *compi
 
 void view_up_finish(struct view_up_stage *stage)
 {
-	for (int i = 0; i < 4; i++)
-		pass_destroy(stage->look[i / 2][i % 2]);
+	struct pass **look = &stage->look[0][0][0][0];
+	for (size_t i = 0; i < sizeof stage->look / sizeof *look; i++)
+		pass_destroy(look[i]);
 	for (int i = 0; i < VIEW_UP_AIR_TABLES; i++)
 		texture_finish(&stage->air_tables[i]);
 	texture_finish(&stage->received);

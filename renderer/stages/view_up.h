@@ -14,8 +14,8 @@ enum { VIEW_UP_AIR_TABLES = 3 };
 struct view_up_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
 	struct pass *air, *first, *light;
-	/* By view_up_pass's arguments; those for unpacked fields are made when wanted. */
-	struct pass *look[2][2];
+	/* By view_up_pass's arguments; all but those that most pictures need are made when wanted. */
+	struct pass *look[PROJECTION_COUNT][2][2][2];
 	struct texture air_tables[VIEW_UP_AIR_TABLES]; /* of the frame in work */
 	struct texture received;                       /* view of radiosity_light.cloud_received */
 };
@@ -37,7 +37,7 @@ bool view_up_prepare(struct view_up_stage *stage, struct stage_context *context,
 		     const struct view_up_inputs *inputs, struct pass_run *run);
 
 /* The program to run over pixels above the horizon, with the samplers that view_up_prepare left in its run. near: none of them is larger
- * than a texel of the field, or shows the sun's disc. NULL after log lines when it does not compile. */
-const struct pass *view_up_pass(struct view_up_stage *stage, bool packed, bool near);
+ * than half a texel of the field or shows the sun's disc; large_sun: sun_disc.large. NULL after log lines when it does not compile. */
+const struct pass *view_up_pass(struct view_up_stage *stage, enum projection projection, bool packed, bool near, bool large_sun);
 
 #endif

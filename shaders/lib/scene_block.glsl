@@ -18,6 +18,7 @@ layout(std140, binding = 0) uniform scene_block {
 	vec4 camera_up;
 	vec4 camera_forward;
 	vec4 image_size;
+	vec4 sun_disc_box;
 	vec4 cloud_layer;
 	vec4 cloud_field;
 	vec4 cloud_drift;

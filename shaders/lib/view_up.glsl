@@ -62,7 +62,7 @@ up_ray up_ray_of(vec3 direction)
 	ray.mu_v = max(sphere_cosine(camera_position.z, direction.z, ray.distance, base), 0.01);
 	ray.mu_l = max(view_lit_cosine(view_sun_cosine(direction, ray.distance, base)), 0.01);
 	ray.place = vec2(camera_position) + vec2(direction) * ray.distance;
-	ray.footprint = camera_position.w * ray.distance * inversesqrt(ray.mu_v);
+	ray.footprint = camera_footprint(ray.distance, ray.mu_v);
 	return ray;
 }
 
@@ -72,7 +72,8 @@ up_ray up_ray_of(vec3 direction)
 float up_row_sine(float unit)
 {
 	float horizon = sphere_horizon(camera_position.z);
-	return horizon + unit * unit * (1.0 - horizon);
+	float from_pole = SKY_TABLE_POLE * (1.0 - unit);
+	return horizon + unit * unit / (unit * unit + from_pole * from_pole) * (1.0 - horizon);
 }
 
 // Direction of a place in a table of the sky, both coordinates from 0 to 1.
@@ -160,8 +161,8 @@ float up_smooth_thickness(vec2 place, float footprint)
 #endif
 }
 
-// What arrives along a ray that meets the layer from below, W/m2/nm/sr.
-vec3 up_radiance(vec3 direction)
+// What arrives along a ray that meets the layer from below, W/m2/nm/sr. disc: radiance of the sun's disc in the pixel, before the layer.
+vec3 up_radiance(vec3 direction, vec3 disc)
 {
 	vec2 air = sky_table_coordinates(direction);
 	vec2 unit = up_unit(air);
@@ -189,7 +190,7 @@ vec3 up_radiance(vec3 direction)
 	vec3 radiance = vec3(near) + vec3(sky) * along_view + met * diffuse +
 	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * vec3(light));
 #ifndef FIELD_NEAR
-	radiance += view_sun_disc(direction) * exp(-vec3(extinction) * (thickness / ray.mu_v));
+	radiance += disc * exp(-vec3(extinction) * (thickness / ray.mu_v));
 #endif
 	return radiance;
 }

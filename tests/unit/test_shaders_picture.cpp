@@ -66,6 +66,17 @@ namespace above
 {
 #include "shaders/passes/view.glsl"
 } // namespace above
+#include "tests/unit/glsl_again.h"
+#define HEIGHT_NEAR 1
+namespace height_start_pass
+{
+#include "shaders/passes/height_start.glsl"
+} // namespace height_start_pass
+#include "tests/unit/glsl_again.h"
+namespace height_view_pass
+{
+#include "shaders/passes/height_view.glsl"
+} // namespace height_view_pass
 } // namespace glsl
 #undef VIEW_ABOVE
 #undef VIEW_CLOUDS
@@ -187,7 +198,8 @@ static view_inputs inputs_of(const scene &scene, const made &out)
 		out.slab_slices,
 		&out.sky,
 		&out.field,
-		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light};
+		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light,
+		nullptr};
 }
 
 static picture render_gpu(const scene &scene, made &out)
@@ -251,10 +263,10 @@ static void copy_textures(const made &out)
 	glsl::air_to_end = copy_of(out.sky.to_end);
 	glsl::ground_map = copy_of(out.ground.map);
 	glsl::ground_relief = copy_of(out.ground.relief);
-	glsl::field_coarse = copy_of(out.field.coarse_packed);
-	glsl::field_detail = copy_of(out.field.detail_packed);
+	glsl::field_coarse = copy_of(out.field.coarse_packed ? out.field.coarse_packed : out.field.coarse);
+	glsl::field_detail = copy_of(out.field.detail_packed ? out.field.detail_packed : out.field.detail);
 	glsl::height_table = copy_of(out.field.height);
-	glsl::height_maximum = copy_of(out.field.maximum);
+	glsl::height_light = copy_of(out.field.light);
 	glsl::smooth_table = copy_of(out.field.smooth);
 	glsl::phase_table = copy_of(&out.drops->phase);
 	glsl::event_table = copy_of(&out.drops->events);
@@ -262,6 +274,33 @@ static void copy_textures(const made &out)
 	glsl::slab_slices = copy_of_volume(out.slab_slices);
 	glsl::ground_received = copy_of(out.light.ground_received);
 	glsl::cloud_received = copy_of(out.light.cloud_received);
+	GLint bytes = 0;
+	glGetNamedBufferParameteriv(shared.view.disc.buffer, GL_BUFFER_SIZE, &bytes);
+	glsl::sun_disc_weights.resize((size_t)bytes / sizeof(float));
+	glGetNamedBufferSubData(shared.view.disc.buffer, 0, bytes, glsl::sun_disc_weights.data());
+}
+
+/* What a pass stores, as a texture. */
+static glsl::sampler2D pass_to_texture(void (*pass)(glsl::ivec2), int output, int width, int height)
+{
+	auto image = std::make_shared<glsl::image>();
+	image->nearest = true;
+	image->levels.push_back({width, height, {}});
+	for (int y = 0; y < height; y++)
+		for (int x = 0; x < width; x++) {
+			pass(glsl::ivec2(x, y));
+			image->levels[0].texels.push_back(glsl::stored[output]);
+		}
+	return image;
+}
+
+/* What the height view stage makes of a camera above the clouds. */
+static void look_at_heights()
+{
+	const int block = glsl::height_start_pass::HEIGHT_BLOCK;
+	glsl::height_start = pass_to_texture(glsl::height_start_pass::pass, 0, (WIDTH + block - 1) / block, (HEIGHT + block - 1) / block);
+	glsl::seen_place = pass_to_texture(glsl::height_view_pass::pass, 0, WIDTH, HEIGHT);
+	glsl::seen_light = pass_to_texture(glsl::height_view_pass::pass, 1, WIDTH, HEIGHT);
 }
 
 static picture render_cpu(int variant, const made &out)
@@ -269,10 +308,14 @@ static picture render_cpu(int variant, const made &out)
 	picture picture;
 	copy_textures(out);
 	glsl::set_scene_block(shared.context.block);
-	for (int i = 1; i < 4; i++)
-		glsl::arguments[i] = glsl::vec4(1.0f); /* all paths are shown */
+	if (out.field.light)
+		look_at_heights();
+	/* All paths are shown. */
+	glsl::arguments[1] = glsl::arguments[2] = glsl::arguments[3] = glsl::vec4(1.0f);
 	for (int i = 0; i < LAYERS; i++) {
 		glsl::arguments[0].x = (float)layers[i];
+		for (int k = 1; k < 4; k++)
+			glsl::arguments[k] = glsl::vec4(1.0f); /* all paths */
 		for (int y = 0; y < HEIGHT; y++)
 			for (int x = 0; x < WIDTH; x++) {
 				cpu_pass[variant](glsl::ivec2(x, y));

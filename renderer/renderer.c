@@ -146,8 +146,8 @@ void renderer_destroy(struct renderer *renderer)
 	if (renderer->gl) {
 		for (int i = 0; i < STAGE_COUNT; i++)
 			gl_timer_finish(&renderer->timers[i]);
+		cache_destroy(renderer->context.cache); /* first: what it drops may go back to a stage */
 		finish_stages(renderer);
-		cache_destroy(renderer->context.cache);
 		if (renderer->context.block_buffer)
 			glDeleteBuffers(1, &renderer->context.block_buffer);
 		gl_context_destroy(renderer->gl);

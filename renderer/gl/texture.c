@@ -86,6 +86,12 @@ struct texture texture_level(const struct texture *texture, int level)
 	return view;
 }
 
+void texture_filter_linearly(struct texture *texture)
+{
+	glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+	glTextureParameteri(texture->id, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+}
+
 size_t texture_bytes(const struct texture *texture)
 {
 	size_t bytes = 0;

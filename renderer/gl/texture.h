@@ -37,6 +37,9 @@ void texture_build_mipmaps(const struct texture *texture);
  * The caller finishes it, before or after the whole. */
 struct texture texture_level(const struct texture *texture, int level);
 
+/* Filtered linearly from here on. */
+void texture_filter_linearly(struct texture *texture);
+
 /* Bytes of all levels. */
 size_t texture_bytes(const struct texture *texture);
 

@@ -51,6 +51,11 @@ bool field_stage_init(struct field_stage *stage, const struct pass_compiler *com
 	if (!stage_create_passes(compiler, pass_descs, stage->passes, FIELD_PASS_COUNT) || !field_noise_init(&stage->noise, compiler) ||
 	    !height_light_init(&stage->light, compiler))
 		return false;
+	stage->pack = packed_pass_create(compiler);
+	if (!stage->pack) {
+		stage_destroy_passes(stage->passes, FIELD_PASS_COUNT);
+		return false;
+	}
 	glCreateBuffers(1, &stage->histogram);
 	glNamedBufferStorage(stage->histogram, HISTOGRAM_BINS * sizeof(unsigned), NULL, 0);
 	return true;
@@ -61,6 +66,8 @@ void field_stage_finish(struct field_stage *stage)
 	if (stage->histogram)
 		glDeleteBuffers(1, &stage->histogram);
 	stage->histogram = 0;
+	pass_destroy(stage->pack);
+	stage->pack = NULL;
 	height_light_finish(&stage->light);
 	field_noise_finish(&stage->noise);
 	stage_destroy_passes(stage->passes, FIELD_PASS_COUNT);
@@ -334,6 +341,24 @@ static bool thickness_get(const struct field_stage *stage, struct stage_context 
 	return maps->light;
 }
 
+/* Packed pictures take six times the memory. */
+static bool packed_maps_get(const struct field_stage *stage, struct stage_context *context, const struct scene_clouds *clouds,
+			    struct field_maps *maps)
+{
+	enum { PACKED_SIDE_MAX = 1024 };
+	struct cache_key coarse = cache_key_make("coarse packed"), detail = cache_key_make("detail packed");
+	struct cache_key smooth = thickness_key("smooth packed", clouds);
+	add_field_inputs(&coarse, clouds);
+	add_field_inputs(&detail, clouds);
+	cache_key_add(&smooth, context->block.slab_light[2]);
+	maps->smooth_packed = packed_get(stage->pack, context, &smooth, maps->smooth, TEXTURE_RGBA32F);
+	if (clouds->resolution > PACKED_SIDE_MAX)
+		return maps->smooth_packed;
+	maps->coarse_packed = packed_get(stage->pack, context, &coarse, maps->coarse, TEXTURE_RGBA32F);
+	maps->detail_packed = packed_get(stage->pack, context, &detail, maps->detail, TEXTURE_RGBA16F);
+	return maps->smooth_packed && maps->coarse_packed && maps->detail_packed;
+}
+
 bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, bool from_above,
 		     struct field_maps *maps)
 {
@@ -354,7 +379,8 @@ bool field_stage_run(const struct field_stage *stage, struct stage_context *cont
 	stage_upload_block(context);
 	maps->coarse = &coarse->coarse;
 	maps->detail = &coarse->detail;
-	if (!thickness_get(stage, context, scene, coarse, from_above, maps)) {
+	if (!thickness_get(stage, context, scene, coarse, from_above, maps) ||
+	    (!from_above && !packed_maps_get(stage, context, &scene->clouds, maps))) {
 		log_error("field: out of memory");
 		return false;
 	}

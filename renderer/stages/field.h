@@ -9,6 +9,7 @@
 
 #include "renderer/stages/field_noise.h"
 #include "renderer/stages/height_light.h"
+#include "renderer/stages/packed.h"
 
 enum { FIELD_PASS_COUNT = 4 };
 
@@ -16,6 +17,7 @@ struct field_stage {
 	struct pass *passes[FIELD_PASS_COUNT];
 	struct field_noise noise;
 	struct height_light_stage light;
+	struct pass *pack;
 	unsigned histogram; /* OpenGL buffer */
 };
 
@@ -24,6 +26,8 @@ struct field_maps {
 	const struct texture *thickness;       /* over the tile, m, in the frame of the drifting clouds, 256 texels a side */
 	const struct texture *smooth;          /* the same evened out */
 	const struct texture *height, *light;  /* finer thickness with its maxima, and the sun on it; NULL unless asked for */
+	/* Packed, for views from below; coarse and detail NULL at resolutions where that would be too much memory. */
+	const struct texture *coarse_packed, *detail_packed, *smooth_packed;
 };
 
 bool field_stage_init(struct field_stage *stage, const struct pass_compiler *compiler);

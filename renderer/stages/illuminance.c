@@ -16,7 +16,7 @@ void illuminance_stage_init(struct illuminance_stage *stage, const struct pass_c
 
 void illuminance_stage_finish(struct illuminance_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	*stage = (struct illuminance_stage){0};
@@ -24,7 +24,7 @@ void illuminance_stage_finish(struct illuminance_stage *stage)
 
 static const struct pass *pass_of(struct illuminance_stage *stage, const struct view_variant *variant)
 {
-	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight];
+	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->packed];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/illuminance.glsl", 1, variant);
 	return *pass;

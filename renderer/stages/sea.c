@@ -19,7 +19,7 @@ void sea_stage_init(struct sea_stage *stage, const struct pass_compiler *compile
 
 void sea_stage_finish(struct sea_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	*stage = (struct sea_stage){0};
@@ -122,8 +122,9 @@ const struct texture *sea_stage_run(struct sea_stage *stage, struct stage_contex
 	const struct view_variant variant = {.side = clouds ? VIEW_BELOW : VIEW_CLEAR,
 					     .region = VIEW_SKY,
 					     .shading = clouds ? scene->model.shading : SHADING_SOLVED,
-					     .twilight = clouds && context->block.slab_light[1] > 0};
-	struct pass **pass = &stage->passes[clouds][variant.shading][variant.twilight];
+					     .twilight = clouds && context->block.slab_light[1] > 0,
+					     .packed = clouds && inputs->field->coarse_packed};
+	struct pass **pass = &stage->passes[clouds][variant.shading][variant.twilight][variant.packed];
 	if (!*pass && !(*pass = view_create_pass(&stage->compiler, "shaders/passes/sea_sky.glsl", 1, &variant)))
 		return NULL;
 	struct pass_run run = {0};

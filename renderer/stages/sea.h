@@ -10,8 +10,8 @@
 extern const double sea_eye_m;
 
 struct sea_stage {
-	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	struct pass *passes[2][2][2];  /* by clouds, shading, twilight; made with the first picture of a sea */
+	struct pass_compiler compiler;   /* shader_dir must outlive the stage */
+	struct pass *passes[2][2][2][2]; /* by clouds, shading, twilight, packed; made with the first picture of a sea */
 };
 
 void sea_stage_init(struct sea_stage *stage, const struct pass_compiler *compiler);

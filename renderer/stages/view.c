@@ -25,7 +25,10 @@ static const struct {
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
 			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
-static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
+static const struct pass_desc develop_descs[2] = {
+	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 0\n", .outputs = 1, .samplers = {"picture"}},
+	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 1\n", .outputs = 1, .samplers = {"picture"}},
+};
 
 /* Of what lies close by (shaders/lib/ground.glsl). */
 static const enum view_ground grounds[GROUND_TYPE_COUNT] = {
@@ -36,10 +39,11 @@ struct pass *view_create_pass(const struct pass_compiler *compiler, const char *
 	char defines[320];
 	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
-		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
+		 "%s%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
 		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n",
-		 sides[variant->side].defines, variant->region, variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers,
-		 variant->projection, variant->large_sun, variant->ground);
+		 sides[variant->side].defines, variant->packed ? "#define FIELD_PACKED 1\n" : "", variant->region,
+		 variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers, variant->projection, variant->large_sun,
+		 variant->ground);
 	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
 	if (variant->ground == VIEW_SEA)
 		desc.samplers[GROUND_SAMPLER] = "sea_sky";
@@ -50,7 +54,7 @@ struct pass *view_create_pass(const struct pass_compiler *compiler, const char *
 static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
 	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region]
-					   [variant->projection][variant->large_sun][variant->ground];
+					   [variant->projection][variant->large_sun][variant->packed][variant->ground];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
@@ -59,11 +63,16 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
-	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL && height_view_init(&stage->height, compiler);
+	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, 2) && view_up_init(&stage->up, compiler) &&
+		  height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
-			ok = pass_of(stage, &(struct view_variant){
-						    .side = side, .region = region, .shading = SHADING_SOLVED, .ground = VIEW_GROWN});
+			ok = (side == VIEW_BELOW && region == VIEW_SKY) ||
+			     pass_of(stage, &(struct view_variant){.side = side,
+								   .region = region,
+								   .shading = SHADING_SOLVED,
+								   .packed = side == VIEW_BELOW,
+								   .ground = VIEW_GROWN});
 	if (!ok)
 		view_stage_finish(stage);
 	return ok;
@@ -71,10 +80,12 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
-	pass_destroy(stage->develop);
+	view_up_finish(&stage->up);
+	stage_destroy_passes(stage->develop, 2);
+	texture_finish(&stage->spare);
 	disc_buffer_finish(&stage->disc);
 	height_view_finish(&stage->height);
 	*stage = (struct view_stage){0};
@@ -111,10 +122,12 @@ void view_fill_block(struct scene_block *block, const struct scene *scene)
 	set4(block->band_blue, matrix[0][2], matrix[1][2], matrix[2][2], 0);
 }
 
-static struct cache_key make_key(const struct scene *scene, enum layer layer)
+/* A color alone is made by other programs than one among layers, which is exactly their sum. */
+static struct cache_key make_key(const struct scene *scene, enum layer layer, bool alone)
 {
 	const struct scene_camera *camera = &scene->camera;
 	const double inputs[] = {layer,
+				 alone,
 				 scene->output.width,
 				 scene->output.height,
 				 camera->position_m[0],
@@ -134,22 +147,38 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 	return key;
 }
 
+/* What the cache keeps of a layer. */
+struct picture {
+	struct texture texture;
+	struct texture *spare; /* of the stage */
+};
+
+/* The memory of a picture is worth keeping: software renderers clear what they allocate. */
 static void picture_destroy(void *value)
 {
-	struct texture *picture = value;
-	texture_finish(picture);
+	struct picture *picture = value;
+	texture_finish(picture->spare);
+	*picture->spare = picture->texture;
 	free(picture);
 }
 
-static struct texture *picture_create(const struct scene *scene)
+static struct picture *picture_create(struct view_stage *stage, const struct scene *scene)
 {
-	struct texture *picture = calloc(1, sizeof *picture);
-	if (picture && !texture_init(picture, scene->output.width, scene->output.height, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
-		free(picture);
-		picture = NULL;
-	}
-	if (!picture)
+	struct picture *picture = calloc(1, sizeof *picture);
+	struct texture *spare = &stage->spare;
+	const int width = scene->output.width, height = scene->output.height;
+	if (!picture) {
 		log_error("view: out of memory");
+		return NULL;
+	}
+	picture->spare = spare;
+	if (spare->id && spare->width == width && spare->height == height) {
+		picture->texture = *spare;
+		*spare = (struct texture){0};
+	} else if (!texture_init(&picture->texture, width, height, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
+		free(picture);
+		return NULL;
+	}
 	return picture;
 }
 
@@ -171,7 +200,7 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 		run->samplers[GROUND_SAMPLER] = in->sea_sky;
 	if (side == VIEW_CLEAR)
 		return;
-	const bool above = side == VIEW_ABOVE;
+	const bool above = side == VIEW_ABOVE, packed = in->field->coarse_packed;
 	const struct texture *clouds[] = {&in->droplets->phase,
 					  &in->droplets->events,
 					  in->slab_rows,
@@ -179,8 +208,12 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 					  in->light->ground_received,
 					  in->light->cloud_received,
 					  above ? in->field->light : in->field->smooth,
-					  above ? (in->seen ? &in->seen->place : NULL) : in->field->coarse,
-					  above ? (in->seen ? &in->seen->light : NULL) : in->field->detail};
+					  above    ? (in->seen ? &in->seen->place : NULL)
+					  : packed ? in->field->coarse_packed
+						   : in->field->coarse,
+					  above    ? (in->seen ? &in->seen->light : NULL)
+					  : packed ? in->field->detail_packed
+						   : in->field->detail};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -223,22 +256,66 @@ static enum view_region region_of_row(const struct scene_block *block, const str
 	return highest < ground - margin ? VIEW_GROUND : VIEW_MIXED;
 }
 
-/* Runs over rows of one kind after the other, each with the program made for it. */
+/* Is no pixel of a row, all above the horizon, larger than half a texel of the field or a texel of the thickness evened out? */
+static bool row_is_near(const struct scene_block *block, const struct camera_view *view, int row)
+{
+	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0];
+	const double texels = fmax(2 * block->cloud_threshold[3], 256);
+	double lowest, highest;
+	bound_row(view, row, &lowest, &highest);
+	const double b = (radius + h) * lowest, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
+	const double mu_v = ((radius + h) * lowest + distance) / (radius + base);
+	/* As camera_footprint in shaders/lib/camera.glsl. */
+	const double slant = view->projection == PROJECTION_FISHEYE ? mu_v : sqrt(mu_v);
+	return mu_v > 0.01 && block->camera_position[3] * distance / slant < block->cloud_layer[2] / texels;
+}
+
+static bool row_has_disc(const struct scene_block *block, bool large, int row)
+{
+	return large || (row >= block->sun_disc_box[1] && row < block->sun_disc_box[1] + block->sun_disc_box[3]);
+}
+
+/* Rows [first, end) up at the layer, as `run` was prepared by view_up_prepare. */
+static bool run_up(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view, struct view_variant variant,
+		   struct pass_run *run, int first, int end)
+{
+	for (int next; first < end; first = next) {
+		const bool near = row_is_near(block, view, first) && !row_has_disc(block, variant.large_sun, first);
+		for (next = first + 1; next < end; next++)
+			if (near != (row_is_near(block, view, next) && !row_has_disc(block, variant.large_sun, next)))
+				break;
+		const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, near, variant.large_sun);
+		if (!pass)
+			return false;
+		run->first_row = first;
+		run->height = next - first;
+		pass_run(pass, run);
+	}
+	return true;
+}
+
+/* Runs over rows of one kind after the other, each with the program made for it. `up`: how those that look up at the layer are run, or NULL
+ * for the ordinary program. */
 static bool run_regions(struct view_stage *stage, const struct stage_context *context, const struct camera_view *view,
-			struct view_variant variant, struct pass_run *run)
+			struct view_variant variant, struct pass_run *run, struct pass_run *up)
 {
 	const int last = view->first_row + view->height;
 	for (int first = view->first_row; first < last;) {
 		variant.region = region_of_row(&context->block, view, variant.side, first);
-		const struct pass *pass = pass_of(stage, &variant);
-		if (!pass)
-			return false;
 		int end = first + 1;
 		while (end < last && region_of_row(&context->block, view, variant.side, end) == variant.region)
 			end++;
-		run->first_row = first;
-		run->height = end - first;
-		pass_run(pass, run);
+		if (up && variant.region == VIEW_SKY) {
+			if (!run_up(stage, &context->block, view, variant, up, first, end))
+				return false;
+		} else {
+			const struct pass *pass = pass_of(stage, &variant);
+			if (!pass)
+				return false;
+			run->first_row = first;
+			run->height = end - first;
+			pass_run(pass, run);
+		}
 		first = end;
 	}
 	return true;
@@ -257,12 +334,22 @@ static bool run_whole(struct view_stage *stage, const struct camera_view *view, 
 }
 
 /* One view of the picture after the other. */
-static bool run_views(struct view_stage *stage, struct stage_context *context, const struct scene *scene, struct view_variant variant,
-		      struct pass_run *run)
+static bool run_views(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		      struct view_variant variant, struct pass_run *run)
 {
 	/* Programs made only for this picture are not worth making three of. */
 	const bool whole = variant.layers || variant.twilight;
-	run->width = run->targets[0]->width;
+	const bool fast = !whole && variant.side == VIEW_BELOW && variant.shading == SHADING_SOLVED;
+	struct pass_run up = {.targets = run->targets, .width = run->targets[0]->width};
+	const struct view_up_inputs from = {.droplets = inputs->droplets,
+					    .slab_rows = inputs->slab_rows,
+					    .slab_slices = inputs->slab_slices,
+					    .sky = inputs->sky,
+					    .field = inputs->field,
+					    .light = inputs->light};
+	if (fast && !view_up_prepare(&stage->up, context, scene, &from, &up))
+		return false;
+	run->width = up.width;
 	for (int i = 0; i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
 		variant.projection = view.projection;
@@ -270,7 +357,7 @@ static bool run_views(struct view_stage *stage, struct stage_context *context, c
 		fill_camera(&context->block, scene, &view);
 		disc_buffer_bind(&stage->disc, i, &context->block);
 		stage_upload_block(context);
-		if (!(whole ? run_whole(stage, &view, variant, run) : run_regions(stage, context, &view, variant, run)))
+		if (!(whole ? run_whole(stage, &view, variant, run) : run_regions(stage, context, &view, variant, run, fast ? &up : NULL)))
 			return false;
 	}
 	return true;
@@ -288,42 +375,44 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 				     .shading = scene->model.shading,
 				     .twilight = context->block.slab_light[1] > 0,
 				     .layers = layers,
+				     .packed = side == VIEW_BELOW && inputs->field->coarse_packed,
 				     .ground = ground};
 }
 
-/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. */
+/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. alone: the color of all paths, and nothing else, is wanted. */
 static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-		      const enum layer *layers, int count, const struct texture **pictures)
+		      const enum layer *layers, int count, bool alone, const struct texture **textures)
 {
+	struct picture *pictures[VIEW_OUTPUTS] = {0};
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const bool some_paths = scene->model.paths != SCENE_PATHS_ALL;
-	const struct view_variant variant = view_variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR || some_paths);
+	const struct view_variant variant = view_variant_of(context, scene, inputs, !alone);
 	for (int i = 0; i <= LAYER_AIR - LAYER_SUN_DIRECT; i++)
 		run.arguments[1 + i / 4][i % 4] = (float)(scene->model.paths >> i & 1);
 	view_bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
-		targets[i] = picture_create(scene);
-		if (!targets[i])
+		pictures[i] = picture_create(stage, scene);
+		if (!pictures[i])
 			goto fail;
+		targets[i] = &pictures[i]->texture;
 	}
-	if (!run_views(stage, context, scene, variant, &run))
+	if (!run_views(stage, context, scene, inputs, variant, &run))
 		goto fail;
 	for (int i = 0; i < count; i++) {
-		const struct cache_key key = make_key(scene, layers[i]);
-		struct texture *picture = targets[i];
-		targets[i] = NULL;
-		if (!cache_keep(context->cache, &key, picture, texture_bytes(picture), picture_destroy))
+		const struct cache_key key = make_key(scene, layers[i], alone);
+		struct picture *picture = pictures[i];
+		pictures[i] = NULL;
+		if (!cache_keep(context->cache, &key, picture, texture_bytes(&picture->texture), picture_destroy))
 			goto fail;
-		pictures[i] = picture;
+		textures[i] = &picture->texture;
 	}
 	return true;
 
 fail:
 	for (int i = 0; i < count; i++)
-		if (targets[i])
-			picture_destroy(targets[i]);
+		if (pictures[i])
+			picture_destroy(pictures[i]);
 	return false;
 }
 
@@ -346,11 +435,14 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 		    const struct texture **pictures)
 {
 	enum layer missing[LAYER_COUNT];
+	const bool alone = count == 1 && layers[0] == LAYER_COLOR && scene->model.paths == SCENE_PATHS_ALL;
 	int place[LAYER_COUNT], missing_count = 0;
 	for (int i = 0; i < count; i++) {
-		const struct cache_key key = make_key(scene, layers[i]);
-		pictures[i] = cache_find(context->cache, &key);
-		if (!pictures[i]) {
+		const struct cache_key key = make_key(scene, layers[i], alone);
+		const struct picture *picture = cache_find(context->cache, &key);
+		if (picture) {
+			pictures[i] = &picture->texture;
+		} else {
 			place[missing_count] = i;
 			missing[missing_count++] = layers[i];
 		}
@@ -366,7 +458,8 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
-		ok = !(cancelled && cancelled(cancel_context)) && run_group(stage, context, scene, &with_seen, missing + i, group, made);
+		ok = !(cancelled && cancelled(cancel_context)) &&
+		     run_group(stage, context, scene, &with_seen, missing + i, group, alone, made);
 		for (int k = 0; k < group; k++)
 			pictures[place[i + k]] = made[k];
 		i += group;
@@ -377,5 +470,5 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 
 void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)
 {
-	pass_run(stage->develop, &(struct pass_run){.targets = &target, .samplers = {picture}});
+	pass_run(stage->develop[target->format == TEXTURE_RGBA8], &(struct pass_run){.targets = &target, .samplers = {picture}});
 }

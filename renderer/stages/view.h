@@ -7,7 +7,7 @@
 
 #include "renderer/stages/disc.h"
 #include "renderer/stages/height_view.h"
-#include "renderer/stages/radiosity.h"
+#include "renderer/stages/view_up.h"
 
 /* Layers that one run of the view pass makes. */
 enum { VIEW_OUTPUTS = 4 };
@@ -31,15 +31,18 @@ struct view_variant {
 	enum projection projection; /* of a camera_view */
 	bool large_sun;             /* sun_disc.large */
 	enum view_ground ground;
+	bool packed; /* the field, from below */
 };
 
 struct view_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	/* By shading, side, twilight, layers, region, projection, large sun, ground. Those that most pictures need are made at the start,
-	 * the others with the first picture that wants them. */
-	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][VIEW_GROUNDS];
+	/* By shading, side, twilight, layers, region, projection, large sun, packed, ground. Those that most pictures need are made at the
+	 * start, the others with the first picture that wants them. */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][2][VIEW_GROUNDS];
+	struct view_up_stage up;
 	struct height_view_stage height;
-	struct pass *develop;
+	struct pass *develop[2]; /* into codes of 16 and of 8 bits */
+	struct texture spare;    /* of a picture that was dropped, to be used again; may be none */
 	struct disc_buffer disc; /* of the last picture made */
 };
 

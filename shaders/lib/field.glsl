@@ -2,6 +2,7 @@
 #ifndef SHADERS_LIB_FIELD
 #define SHADERS_LIB_FIELD
 #include "shaders/lib/bicubic.glsl"
+#include "shaders/lib/packed.glsl"
 #include "shaders/lib/scene_block.glsl"
 
 #ifndef __cplusplus
@@ -26,6 +27,32 @@ float field_bicubic(sampler2D field, vec2 uv, float size, float octaves)
 	return mix(b, a, s.share.y);
 }
 
+// Texels of the detail's side.
+const int FIELD_DETAIL_SIZE = 512;
+
+// Both pictures at a place in their tiles, seen by a pixel that is larger than a texel by so many octaves. FIELD_PACKED: the samplers hold them packed
+// (shaders/lib/packed.glsl); FIELD_NEAR: all pixels are smaller than half a texel of the field.
+float field_coarse_at(vec2 uv, float octaves)
+{
+#if defined(FIELD_PACKED) && defined(FIELD_NEAR)
+	return packed_spline(field_coarse, uv, int(cloud_threshold.w), 0);
+#elif defined(FIELD_PACKED)
+	int side = int(cloud_threshold.w);
+	return mix(packed_linear_between(field_coarse, uv, side, octaves), packed_spline(field_coarse, uv, side, 0), clamp(-octaves, 0.0, 1.0));
+#else
+	return field_bicubic(field_coarse, uv, cloud_threshold.w, octaves);
+#endif
+}
+
+float field_detail_at(vec2 uv, float octaves)
+{
+#ifdef FIELD_PACKED
+	return packed_linear_between(field_detail, uv, FIELD_DETAIL_SIZE, octaves);
+#else
+	return textureLod(field_detail, uv, max(0.0, octaves)).x;
+#endif
+}
+
 // Octaves by which the footprint is larger than a texel of the field.
 float field_octaves(float footprint)
 {
@@ -43,13 +70,13 @@ float field_density(vec2 place, float footprint)
 {
 	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
 	float octaves = field_octaves(footprint);
-	float density = field_bicubic(field_coarse, p / cloud_layer.z, cloud_threshold.w, octaves);
+	float density = field_coarse_at(p / cloud_layer.z, octaves);
 	vec2 uv = field_detail_place(p, density);
-	float sum = textureLod(field_detail, uv, max(0.0, octaves + 3.0)).x;
+	float sum = field_detail_at(uv, octaves + 3.0);
 	float weight = 0.5;
 	for (int i = 1; i < int(cloud_field.z); i++) {
 		uv *= FIELD_DETAIL_STEP;
-		sum += weight * textureLod(field_detail, uv, max(0.0, octaves + 6.0)).x;
+		sum += weight * field_detail_at(uv, octaves + 6.0);
 		weight *= 0.5;
 		octaves += 3.0;
 	}

@@ -41,7 +41,8 @@ namespace clear
 } // namespace clear
 #include "tests/unit/glsl_again.h"
 #undef VIEW_CLOUDS
-#define VIEW_CLOUDS 1
+#define VIEW_CLOUDS  1
+#define FIELD_PACKED 1
 namespace below
 {
 #include "shaders/passes/view.glsl"
@@ -54,6 +55,7 @@ namespace below_paper
 #include "shaders/passes/view.glsl"
 } // namespace below_paper
 #include "tests/unit/glsl_again.h"
+#undef FIELD_PACKED
 #undef VIEW_ABOVE
 #define VIEW_ABOVE 1
 namespace above_paper
@@ -164,13 +166,13 @@ static void start(pass_kind kind)
 static void stop()
 {
 	droplets_release(&shared.context);
+	cache_destroy(shared.context.cache);
 	view_stage_finish(&shared.view);
 	sea_stage_finish(&shared.sea);
 	radiosity_stage_finish(&shared.radiosity);
 	field_stage_finish(&shared.field);
 	sky_stage_finish(&shared.sky);
 	ground_stage_finish(&shared.ground);
-	cache_destroy(shared.context.cache);
 	glDeleteBuffers(1, &shared.context.block_buffer);
 }
 
@@ -310,8 +312,8 @@ static void copy_textures(const made &out)
 	glsl::air_to_end = copy_of(out.sky.to_end);
 	glsl::ground_map = copy_of(out.ground.map);
 	glsl::sea_sky = copy_of(out.sea_sky);
-	glsl::field_coarse = copy_of(out.field.coarse);
-	glsl::field_detail = copy_of(out.field.detail);
+	glsl::field_coarse = copy_of(out.field.coarse_packed ? out.field.coarse_packed : out.field.coarse);
+	glsl::field_detail = copy_of(out.field.detail_packed ? out.field.detail_packed : out.field.detail);
 	glsl::height_table = copy_of(out.field.height);
 	glsl::height_light = copy_of(out.field.light);
 	glsl::smooth_table = copy_of(out.field.smooth);
@@ -433,7 +435,8 @@ static void compute_shows_what_fragments_show(void **)
 	stop();
 }
 
-/* The programs that make the color alone, for parts of the picture, against the one that makes all layers. */
+/* The programs that make the color alone, for parts of the picture, against the one that makes all layers. From below they take what is
+ * smooth out of tables. */
 static void color_alone_is_the_color(void **)
 {
 	start(PASS_FRAGMENT);
@@ -449,7 +452,10 @@ static void color_alone_is_the_color(void **)
 		stage_read_texture(color, 0, 4, texels.data());
 		const difference d = compare(by_fragments[i].layer[0], texels);
 		print_message("%s: the color alone: %.1f dB\n", variant_names[i], d.psnr);
-		assert_true(d.psnr >= 90 && d.outside <= 0.001);
+		if (i == 1)
+			assert_true(d.psnr >= 60 && d.outside <= 0.02);
+		else
+			assert_true(d.psnr >= 90 && d.outside <= 0.001);
 	}
 	stop();
 }

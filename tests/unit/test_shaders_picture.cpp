@@ -453,7 +453,7 @@ static void color_alone_is_the_color(void **)
 		const difference d = compare(by_fragments[i].layer[0], texels);
 		print_message("%s: the color alone: %.1f dB\n", variant_names[i], d.psnr);
 		if (i == 1)
-			assert_true(d.psnr >= 60 && d.outside <= 0.02);
+			assert_true(d.psnr >= 60 && d.outside <= 0.1); /* closer: test_view_up.c */
 		else
 			assert_true(d.psnr >= 90 && d.outside <= 0.001);
 	}

@@ -1,7 +1,7 @@
 # make run    installs what is missing, builds, starts the daemon
 # make test   installs what tests need, builds, runs all tests
 # make demo   four pictures into out/, with their timings
-# make validate   measures the bounds of the optics and draws the paper's figures into docs/validation/, some minutes
+# make validate   measures the bounds of optics and radiosity and draws the paper's figures into docs/validation/, some minutes
 # make gallery   draws the pictures of docs/gallery
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
 
@@ -102,6 +102,8 @@ $(B)/renderer/optics/paper_fit_solve.c.o: CFLAGS += $(call pkg,--cflags,cminpack
 # The optics are the one place where the compiler's best vector code is worth asking for: nobody there reads errno or traps.
 OPTICS_OPT := -O3 -g -ffp-contract=fast -fno-math-errno -fno-trapping-math
 $(B)/renderer/optics/%.c.o: OPT := $(OPTICS_OPT)
+# The exchange between ground and clouds likewise.
+$(B)/renderer/stages/fourier.c.o $(B)/renderer/stages/exchange.c.o $(B)/renderer/stages/radiosity_solve.c.o: OPT := $(OPTICS_OPT)
 
 # Files of what the optics computed say by which sources, compiler, flags and solver.
 OPTICS_TEXT := $(wildcard renderer/optics/*.[ch]) Makefile
@@ -129,6 +131,9 @@ $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(RENDERER_LIBS)
 $(B)/tests/test_validate_bounds: $(call obj,tests/validate/bounds.c)
+$(B)/tests/test_deck: $(call obj,tests/validate/deck.c)
+$(B)/tests/test_exchange: $(call obj,tests/validate/squares.c)
+$(B)/tests/test_sky_light: $(call obj,tests/validate/air_photons.c)
 
 -include $(shell find $(B) -name '*.d' 2>/dev/null)
 

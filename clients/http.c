@@ -62,6 +62,8 @@ static struct curl_slist *request_headers(const struct client *client, const str
 		headers = curl_slist_append(headers, "Content-Type: application/json");
 		headers = curl_slist_append(headers, "Expect:"); /* no round trip before the body */
 	}
+	if (request->header)
+		headers = curl_slist_append(headers, request->header);
 	if (client->timeout_s > 0) {
 		snprintf(line, sizeof line, "X-Timeout-Ms: %.0f", client->timeout_s * 1000);
 		headers = curl_slist_append(headers, line);
@@ -83,6 +85,13 @@ static void set_options(CURL *curl, const struct client *client, const struct ht
 		curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)strlen(request->json));
 		curl_easy_setopt(curl, CURLOPT_POSTFIELDS, request->json);
 	}
+	if (request->upload) {
+		curl_easy_setopt(curl, CURLOPT_UPLOAD, 1L);
+		curl_easy_setopt(curl, CURLOPT_READDATA, request->upload);
+		curl_easy_setopt(curl, CURLOPT_INFILESIZE_LARGE, (curl_off_t)(request->size < 0 ? -1 : request->size));
+	}
+	if (request->remove)
+		curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, "DELETE");
 }
 
 static bool take_answer(CURL *curl, struct body *body, struct http_response *response)

@@ -5,10 +5,16 @@
 #include "clients/client.h"
 
 #include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
 
 struct http_request {
-	const char *path; /* from the root, "/v1/render" */
-	const char *json; /* body of a POST; NULL: GET */
+	const char *path;   /* from the root, "/v1/render" */
+	const char *json;   /* body of a POST; NULL: GET, or */
+	FILE *upload;       /* body of a PUT, read to its end; NULL: none */
+	int64_t size;       /* of the upload; negative: not known before */
+	bool remove;        /* DELETE */
+	const char *header; /* one more, whole, or NULL */
 };
 
 struct http_response {

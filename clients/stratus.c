@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct command *const commands[] = {&command_render, &command_presets, &command_info, &command_health, NULL};
+static const struct command *const commands[] = {&command_render, &command_asset, &command_presets, &command_info, &command_health, NULL};
 
 static void print_usage(FILE *to)
 {

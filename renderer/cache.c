@@ -26,14 +26,21 @@ struct cache_key cache_key_make(const char *name)
 	return key;
 }
 
-void cache_key_add(struct cache_key *key, double number)
+void cache_key_add_bytes(struct cache_key *key, const unsigned char *bytes, size_t count)
 {
 	/* A key that is too long is our bug; the abort is better than two scenes sharing one result. */
-	if (key->length + sizeof number > CACHE_KEY_MAX)
+	if (key->length + count > CACHE_KEY_MAX)
 		abort();
+	memcpy(key->bytes + key->length, bytes, count);
+	key->length += count;
+}
+
+void cache_key_add(struct cache_key *key, double number)
+{
+	unsigned char bytes[sizeof number];
 	number += 0.0; /* -0 becomes 0 */
-	memcpy(key->bytes + key->length, &number, sizeof number);
-	key->length += sizeof number;
+	memcpy(bytes, &number, sizeof number);
+	cache_key_add_bytes(key, bytes, sizeof bytes);
 }
 
 struct cache *cache_create(size_t bound)

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { CACHE_KEY_MAX = 320 };
+enum { CACHE_KEY_MAX = 512 };
 
 /* Inputs of a result. Numbers are appended as doubles, so that no padding gets in. */
 struct cache_key {
@@ -17,6 +17,8 @@ struct cache_key {
 /* Starts a key with the name of what is computed. */
 struct cache_key cache_key_make(const char *name);
 void cache_key_add(struct cache_key *key, double number);
+/* Bytes of a hash. */
+void cache_key_add_bytes(struct cache_key *key, const unsigned char *bytes, size_t count);
 
 struct cache;
 

@@ -16,8 +16,9 @@
 #define TEMPORARY_ENDING ".XXXXXX"
 #define TEMPORARY_ANY    ".??????"
 
-static bool write_all(int fd, const char *byte, size_t size)
+bool file_write_all(int fd, const void *bytes, size_t size)
 {
+	const char *byte = bytes;
 	while (size > 0) {
 		ssize_t written = write(fd, byte, size);
 		if (written < 0 && errno != EINTR)
@@ -33,13 +34,12 @@ static bool write_all(int fd, const char *byte, size_t size)
 static bool write_parts(int fd, const struct iovec *parts, int count)
 {
 	for (int i = 0; i < count; i++)
-		if (!write_all(fd, parts[i].iov_base, parts[i].iov_len))
+		if (!file_write_all(fd, parts[i].iov_base, parts[i].iov_len))
 			return false;
 	return true;
 }
 
-/* Makes the rename last. What cannot be synced costs no more than the file. */
-static void sync_directory_of(const char *path)
+void file_sync_directory_of(const char *path)
 {
 	char directory[PATH_MAX];
 	snprintf(directory, sizeof directory, "%s", path);
@@ -53,26 +53,39 @@ static void sync_directory_of(const char *path)
 	close(fd);
 }
 
+int file_replace_begin(const char *path, char temporary[static PATH_MAX])
+{
+	if (snprintf(temporary, PATH_MAX, "%s" TEMPORARY_ENDING, path) >= PATH_MAX) {
+		errno = ENAMETOOLONG;
+		return -1;
+	}
+	int fd = mkostemp(temporary, O_CLOEXEC);
+	/* The lock, which dies with the process, tells a file in the making from one that is left. */
+	if (fd >= 0)
+		flock(fd, LOCK_EX | LOCK_NB);
+	return fd;
+}
+
+bool file_replace_finish(int fd, const char *temporary, const char *path)
+{
+	/* mkstemp makes the file private; what is kept here is not secret and may be read by a daemon under another user. */
+	if (fchmod(fd, 0644) != 0 || fsync(fd) != 0 || rename(temporary, path) != 0)
+		return false;
+	file_sync_directory_of(path);
+	return true;
+}
+
 bool file_replace(const char *path, const struct iovec *parts, int count)
 {
 	char temporary[PATH_MAX];
-	if (snprintf(temporary, sizeof temporary, "%s" TEMPORARY_ENDING, path) >= (int)sizeof temporary) {
-		errno = ENAMETOOLONG;
-		return false;
-	}
-	int fd = mkostemp(temporary, O_CLOEXEC);
+	int fd = file_replace_begin(path, temporary);
 	if (fd < 0)
 		return false;
-	/* The lock, which dies with the process, tells a file in the making from one that is left. */
-	flock(fd, LOCK_EX | LOCK_NB);
-	/* mkstemp makes the file private; what the renderer computes is not secret and may be read by a daemon under another user. */
-	bool ok = fchmod(fd, 0644) == 0 && write_parts(fd, parts, count) && fsync(fd) == 0 && rename(temporary, path) == 0;
+	bool ok = write_parts(fd, parts, count) && file_replace_finish(fd, temporary, path);
 	int error = errno;
 	if (!ok)
 		unlink(temporary);
 	close(fd);
-	if (ok)
-		sync_directory_of(path);
 	errno = error;
 	return ok;
 }

@@ -3,9 +3,11 @@
 #include "renderer/gl/context.h"
 #include "renderer/gl/timer.h"
 #include "renderer/log.h"
+#include "renderer/scene_map.h"
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/illuminance.h"
+#include "renderer/stages/sea.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -24,6 +26,7 @@ struct renderer {
 	struct radiosity_stage radiosity;
 	struct view_stage view;
 	struct illuminance_stage illuminance;
+	struct sea_stage sea;
 	struct gl_timer timers[STAGE_COUNT];
 };
 
@@ -33,15 +36,17 @@ enum { DEFAULT_CACHE_BYTES = 256 << 20 };
 
 static bool compile_stages(struct renderer *renderer, const struct pass_compiler *compiler)
 {
+	ground_stage_init(&renderer->ground, compiler);
+	sea_stage_init(&renderer->sea, compiler);
 	illuminance_stage_init(&renderer->illuminance, compiler);
-	return ground_stage_init(&renderer->ground, compiler) && sky_stage_init(&renderer->sky, compiler) &&
-	       field_stage_init(&renderer->field, compiler) && radiosity_stage_init(&renderer->radiosity, compiler) &&
-	       view_stage_init(&renderer->view, compiler);
+	return sky_stage_init(&renderer->sky, compiler) && field_stage_init(&renderer->field, compiler) &&
+	       radiosity_stage_init(&renderer->radiosity, compiler) && view_stage_init(&renderer->view, compiler);
 }
 
 static void finish_stages(struct renderer *renderer)
 {
 	illuminance_stage_finish(&renderer->illuminance);
+	sea_stage_finish(&renderer->sea);
 	view_stage_finish(&renderer->view);
 	radiosity_stage_finish(&renderer->radiosity);
 	field_stage_finish(&renderer->field);
@@ -141,8 +146,8 @@ void renderer_destroy(struct renderer *renderer)
 	if (renderer->gl) {
 		for (int i = 0; i < STAGE_COUNT; i++)
 			gl_timer_finish(&renderer->timers[i]);
+		cache_destroy(renderer->context.cache); /* first: what it drops may go back to a stage */
 		finish_stages(renderer);
-		cache_destroy(renderer->context.cache);
 		if (renderer->context.block_buffer)
 			glDeleteBuffers(1, &renderer->context.block_buffer);
 		gl_context_destroy(renderer->gl);
@@ -188,8 +193,17 @@ static bool run_optics(struct job *job)
 	return job->slab_rows && slab_slices_get(context, job->scene, job->droplets, &job->slab_slices);
 }
 
+/* Reflectance of a deck of this thickness over the ground, with all light between them. */
+static double deck_albedo(const struct job *job, int band, double thickness_m)
+{
+	const struct droplet_tables *droplets = job->droplets->tables;
+	const double tau = thickness_m * droplets->optics->extinction_per_m[band];
+	const double r = slab_spherical_albedo(droplets->slab, band, tau), t = 1 - r, ground = job->ground.mean[band];
+	return r + t * t * ground / (1 - r * ground);
+}
+
 /* What the air above gets back from below: the ground where it lies open, under clouds the deck and the ground behind it with all light
- * between them. A deck counts with 0.6 of its largest thickness, about the mean of its field. */
+ * between them. A deck counts with 0.6 of its largest thickness, about the mean of its field; a map by what it holds. */
 static void mean_albedo(const struct job *job, double albedo[3])
 {
 	for (int band = 0; band < 3; band++)
@@ -197,11 +211,13 @@ static void mean_albedo(const struct job *job, double albedo[3])
 	if (!job->droplets)
 		return;
 	const struct scene_clouds *clouds = &job->scene->clouds;
-	const struct droplet_tables *droplets = job->droplets->tables;
+	const struct scene_map *map = clouds->map.map;
 	for (int band = 0; band < 3; band++) {
-		const double tau = 0.6 * clouds->thickness_m * droplets->optics->extinction_per_m[band];
-		const double r = slab_spherical_albedo(droplets->slab, band, tau), t = 1 - r, ground = job->ground.mean[band];
-		albedo[band] += clouds->coverage * (r + t * t * ground / (1 - r * ground) - ground);
+		const double ground = job->ground.mean[band];
+		if (!map)
+			albedo[band] += clouds->coverage * (deck_albedo(job, band, 0.6 * clouds->thickness_m) - ground);
+		for (int i = 0; map && i < SCENE_MAP_BINS; i++)
+			albedo[band] += map->bins[i].share * (deck_albedo(job, band, map->bins[i].value * clouds->thickness_m) - ground);
 	}
 }
 
@@ -244,14 +260,19 @@ static struct scene_light scene_light_of(const struct job *job)
 	const double mu = fmax(0, sin(job->scene->sun.elevation_deg * M_PI / 180));
 	const bool below = job->clouds && job->scene->camera.position_m[2] < job->scene->clouds.base_m;
 	const bool high = job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
+	const float *beam = job->renderer->context.block.sun_at_camera;
 	double direct[3], diffuse[3];
 	for (int band = 0; band < 3; band++) {
-		direct[band] = below ? job->light.ground_direct[band] : mu * (high ? job->sky.sun_cloud : job->sky.sun_ground)[band];
+		direct[band] = below ? job->light.ground_direct[band] : mu * beam[band];
 		diffuse[band] = below ? job->light.ground_diffuse[band] : (high ? job->sky.diffuse_cloud : job->sky.diffuse_ground)[band];
 	}
 	return (struct scene_light){
 		.direct = colour_luminance(direct), .diffuse = colour_luminance(diffuse), .beam = colour_luminance(job->sky.sun_cloud)};
 }
+
+/* From above a layer is looked at that sends back half to three quarters of what it gets: as snow in the sun is, it is exposed for more
+ * than a grey mean, so that it comes out white. As far as the sun lights it. */
+static const double exposure_above_ev = 0.7;
 
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * whole, sunlight on the ground by half, and a little of the beam itself, which a low sun sends along the ground into the sky that is
@@ -261,9 +282,11 @@ static double exposure_of(const struct job *job)
 {
 	if (!job->scene->output.exposure_auto)
 		return job->scene->output.exposure_ev;
+	const bool above = scene_has_clouds(job->scene) && job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
 	const struct scene_light light = scene_light_of(job);
 	const double lux = fmax(0.65 * light.diffuse + 0.45 * light.direct + 0.08 * light.beam, 1e-2);
-	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000);
+	return log2(0.5 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) +
+	       (above ? exposure_above_ev * light.direct / (light.direct + light.diffuse + 1e-9) : 0);
 }
 
 /* For files of scene light alone: nothing else can hold the figures. */
@@ -293,19 +316,40 @@ static int list_layers(const struct scene *scene, enum layer *layers)
 	return count;
 }
 
+/* What a sea mirrors is seen from its surface, whatever the camera's height. */
+static bool run_sea(struct job *job, struct view_inputs *inputs)
+{
+	struct stage_context *context = &job->renderer->context;
+	const struct scene_block kept = context->block;
+	struct scene low = *job->scene;
+	struct sky_tables sky;
+	struct view_inputs below = *inputs;
+	double albedo[3];
+	mean_albedo(job, albedo);
+	low.camera.position_m[2] = sea_eye_m;
+	context->block.camera_position[2] = (float)sea_eye_m;
+	context->block.camera_position[3] = 0.03f; /* radians between its texels, about */
+	below.sky = &sky;
+	if (sky_stage_run(&job->renderer->sky, context, &low, albedo, &sky))
+		inputs->sea_sky = sea_stage_run(&job->renderer->sea, context, &low, &below);
+	context->block = kept;
+	stage_upload_block(context);
+	return inputs->sea_sky;
+}
+
 static bool run_view(struct job *job)
 {
 	struct renderer *renderer = job->renderer;
 	struct stage_context *context = &renderer->context;
 	const struct scene_output *output = &job->scene->output;
 	struct frame *frame = job->frame;
-	const struct view_inputs inputs = {.ground = &job->ground,
-					   .droplets = job->droplets,
-					   .slab_rows = job->slab_rows,
-					   .slab_slices = job->slab_slices,
-					   .sky = &job->sky,
-					   .field = &job->maps,
-					   .light = job->clouds ? &job->light : NULL};
+	struct view_inputs inputs = {.ground = &job->ground,
+				     .droplets = job->droplets,
+				     .slab_rows = job->slab_rows,
+				     .slab_slices = job->slab_slices,
+				     .sky = &job->sky,
+				     .field = &job->maps,
+				     .light = job->clouds ? &job->light : NULL};
 	frame->exposure_ev = exposure_of(job);
 	context->block.develop[0] = output->exposure_auto;
 	context->block.develop[1] = (float)frame->exposure_ev;
@@ -315,6 +359,8 @@ static bool run_view(struct job *job)
 	if (!measure_illuminance(job, &inputs))
 		return false;
 	frame->layer_count = list_layers(job->scene, frame->layer);
+	if (job->scene->ground.type == GROUND_SEA && !run_sea(job, &inputs))
+		return false;
 	if (!view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
 			    job->cancel_context, job->pictures))
 		return false;
@@ -413,6 +459,7 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	cache_begin_frame(renderer->context.cache);
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
 	view_fill_block(&renderer->context.block, scene);
+	sea_fill_block(&renderer->context.block, scene);
 	/* The sky is tabulated up to the layer, so its heights are known before the field is. */
 	renderer->context.block.cloud_layer[0] = (float)scene->clouds.base_m;
 	renderer->context.block.cloud_layer[1] = (float)scene->clouds.thickness_m;
@@ -421,12 +468,54 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	const enum render_result result = run_stages(&job);
 	frame->radiosity_passes = job.light.passes;
 	frame->radiosity_residual = job.light.residual;
+	memcpy(frame->radiosity_residuals, job.light.residuals, sizeof frame->radiosity_residuals);
 	texture_finish(&job.developed);
 	droplets_release(&renderer->context);
 	if (result != RENDER_OK) {
 		if (result == RENDER_OUT_OF_MEMORY)
 			log_error("renderer: out of memory");
 		frame_finish(frame);
+	}
+	return result;
+}
+
+/* --- the sky alone ----------------------------------------------------------------------------------------------------------------- */
+
+static enum render_result run_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
+					struct sky_light *light)
+{
+	struct stage_context *context = &renderer->context;
+	struct ground_maps ground;
+	const bool ok = ground_stage_run(&renderer->ground, context, scene, &ground) &&
+			sky_stage_run_directions(&renderer->sky, context, scene, ground.mean, directions, light);
+	if (gl_failed("sky light") && !gl_failed_for_memory())
+		return RENDER_FAILED;
+	return ok ? RENDER_OK : gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+}
+
+enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
+				      renderer_cancelled *cancelled, void *context, struct sky_light *light)
+{
+	struct scene clear = *scene;
+	clear.clouds.type = CLOUD_NONE;
+	*light = (struct sky_light){0};
+	if (cancelled && cancelled(context))
+		return RENDER_CANCELLED;
+	cache_begin_frame(renderer->context.cache);
+	memset(&renderer->context.block, 0, sizeof renderer->context.block);
+	view_fill_block(&renderer->context.block, &clear);
+	renderer->context.reused = true;
+	gl_timer_begin(&renderer->timers[STAGE_SKY]);
+	enum render_result result = run_sky_light(renderer, &clear, directions, light);
+	gl_timer_end(&renderer->timers[STAGE_SKY]);
+	light->timing = (struct stage_timing){gl_timer_milliseconds(&renderer->timers[STAGE_SKY]), false};
+	if (result == RENDER_OK && cancelled && cancelled(context))
+		result = RENDER_CANCELLED;
+	if (result != RENDER_OK) {
+		if (result == RENDER_OUT_OF_MEMORY)
+			log_error("renderer: out of memory");
+		free(light->radiance);
+		*light = (struct sky_light){0};
 	}
 	return result;
 }

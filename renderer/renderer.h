@@ -46,6 +46,8 @@ struct stage_timing {
 
 enum pixel_type { PIXEL_U8, PIXEL_U16, PIXEL_F32 };
 
+enum { RADIOSITY_PASSES_LISTED = 32 };
+
 /* One rendered picture: `layer_count` planes of height x width x channels, rows from the top, channels interleaved. */
 struct frame {
 	int width, height;
@@ -57,9 +59,10 @@ struct frame {
 	size_t bytes;
 
 	struct stage_timing timing[STAGE_COUNT];
-	int radiosity_passes;
-	double radiosity_residual; /* relative energy left when the exchange stopped, 0 when not run */
-	double exposure_ev;        /* what multiplied the picture: 2^exposure_ev, also when automatic */
+	int radiosity_passes;      /* 0 when not run */
+	double radiosity_residual; /* light on its way when the exchange stopped, over what the ground receives; 0 when not run */
+	double radiosity_residuals[RADIOSITY_PASSES_LISTED]; /* the same after each of the first passes */
+	double exposure_ev;                                  /* what multiplied the picture: 2^exposure_ev, also when automatic */
 	/* On a horizontal plane at the camera, integrated over the hemisphere above it; EXR only, 0 otherwise. */
 	double global_illuminance_lux; /* direct + diffuse */
 	double direct_illuminance_lux; /* by the beam, through the cloud before it */
@@ -79,10 +82,29 @@ typedef bool renderer_cancelled(void *context);
 
 enum render_result { RENDER_OK, RENDER_CANCELLED, RENDER_OUT_OF_MEMORY, RENDER_FAILED };
 
-/* Renders a valid scene that names no assets. cancelled may be NULL. On RENDER_OK the caller owns frame->pixels (frame_finish); else the
- * frame is zeroed and one log line says why. */
+/* Renders a valid scene; a map that it names must be there. cancelled may be NULL. On RENDER_OK the caller owns frame->pixels
+ * (frame_finish); else the frame is zeroed and one log line says why. */
 enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
 				   struct frame *frame);
+
+/* Directions to look at the sky in: each zenith angle with each azimuth. */
+struct sky_directions {
+	int view_count, azimuth_count; /* from 1 */
+	const double *view_zenith_deg; /* 0..90 */
+	const double *azimuth_deg;     /* -360..720, of the viewing direction, clockwise from north */
+};
+
+/* What a clear sky sends to the ground, per band, over the solar irradiance outside the atmosphere on a plane normal to the beam. */
+struct sky_light {
+	double *radiance;               /* [band][view][azimuth], 1/sr; malloc'd, the sun's disc is not in it */
+	double direct_transmittance[3]; /* of the beam, on a plane normal to it; 0 when the sun has set */
+	double diffuse_irradiance[3];   /* horizontal */
+	struct stage_timing timing;     /* of the sky stage; never reused: directions are always computed */
+};
+
+/* The sky of a valid scene's sun, atmosphere and ground, without clouds. As renderer_render; on RENDER_OK the caller frees radiance. */
+enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
+				      renderer_cancelled *cancelled, void *context, struct sky_light *light);
 
 /* Frees the pixels. Takes a zeroed frame. */
 void frame_finish(struct frame *frame);

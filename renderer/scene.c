@@ -6,6 +6,7 @@
 const char *const scene_cloud_type_names[] = {"stratus", "stratocumulus", "altocumulus", "cirrocumulus", "none", NULL};
 const char *const scene_ground_type_names[] = {"grass", "country", "soil", "sand", "sea", "sea_ice", "snow", "black", "lambert", NULL};
 const char *const scene_projection_names[] = {"perspective", "fisheye", "equirectangular", "cubemap", NULL};
+const char *const scene_face_names[] = {"+X", "-X", "+Y", "-Y", "+Z", "-Z", NULL};
 const char *const scene_model_names[] = {"slab", "reference", "volume", "planar", NULL};
 const char *const scene_shading_names[] = {"solved", "paper", NULL};
 const char *const scene_optics_names[] = {"mie", "paper", NULL};
@@ -56,6 +57,7 @@ struct scene scene_default(void)
 	scene.camera.elevation_deg = 20;
 	scene.camera.vertical_fov_deg = 60;
 	scene.camera.projection = PROJECTION_PERSPECTIVE;
+	scene.camera.face = FACE_ALL;
 	scene.radiosity.enabled = true;
 	scene.radiosity.tolerance = 0.001;
 	scene.radiosity.max_passes = 64;
@@ -63,8 +65,8 @@ struct scene scene_default(void)
 	scene.model.shading = SHADING_SOLVED;
 	scene.model.optics = OPTICS_MIE;
 	scene.model.paths = SCENE_PATHS_ALL;
-	scene.output.width = 1024;
-	scene.output.height = 768;
+	scene.output.width = scene_camera_shape(&scene.camera).width;
+	scene.output.height = scene_camera_shape(&scene.camera).height;
 	scene.output.format = IMAGE_PNG;
 	scene.output.exposure_auto = true;
 	scene.output.tone = TONE_FILMIC;
@@ -92,15 +94,43 @@ double scene_ground_largest_reflectance(const struct scene_ground *ground)
 {
 	/* Of what shaders/lib/ground_paint.glsl paints. */
 	static const double painted[GROUND_TYPE_COUNT] = {
-		[GROUND_COUNTRY] = 0.20, [GROUND_SEA] = 0.07, [GROUND_SEA_ICE] = 0.79, [GROUND_SNOW] = 0.87};
+		[GROUND_GRASS] = 0.13, [GROUND_COUNTRY] = 0.23, [GROUND_SOIL] = 0.22, [GROUND_SAND] = 0.42,
+		[GROUND_SEA] = 0.5,    [GROUND_SEA_ICE] = 0.88, [GROUND_SNOW] = 0.96};
 	double largest = painted[ground->type];
 	if (ground->type == GROUND_LAMBERT)
 		largest = fmax(ground->albedo[0], fmax(ground->albedo[1], ground->albedo[2]));
 	return largest * ground->albedo_scale;
 }
 
+struct scene_shape scene_camera_shape(const struct scene_camera *camera)
+{
+	switch (camera->projection) {
+	case PROJECTION_FISHEYE:
+		return (struct scene_shape){{1, 1}, 1024, 1024};
+	case PROJECTION_EQUIRECTANGULAR:
+		return (struct scene_shape){{2, 1}, 2048, 1024};
+	case PROJECTION_CUBEMAP:
+		return camera->face == FACE_ALL ? (struct scene_shape){{1, 6}, 512, 3072} : (struct scene_shape){{1, 1}, 512, 512};
+	case PROJECTION_PERSPECTIVE:
+	case PROJECTION_COUNT:
+		break;
+	}
+	return (struct scene_shape){{0, 0}, 1024, 768};
+}
+
+/* ImfEnvmap.h of OpenEXR 3.1 draws the faces as they lie in the file, seen from inside; its X, Y, Z are east, up, south. */
+static const double face_axes[FACE_ALL][3][3] = {
+	[FACE_POS_X] = {{0, -1, 0}, {0, 0, 1}, {1, 0, 0}},  [FACE_NEG_X] = {{0, 1, 0}, {0, 0, 1}, {-1, 0, 0}},
+	[FACE_POS_Y] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}},  [FACE_NEG_Y] = {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}},
+	[FACE_POS_Z] = {{-1, 0, 0}, {0, 0, 1}, {0, -1, 0}}, [FACE_NEG_Z] = {{1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
+};
+
 void scene_camera_axes(const struct scene_camera *camera, double axes[3][3])
 {
+	if (camera->projection == PROJECTION_CUBEMAP) {
+		memcpy(axes, face_axes[camera->face == FACE_ALL ? FACE_POS_X : camera->face], sizeof face_axes[0]);
+		return;
+	}
 	const double degree = M_PI / 180, e = camera->elevation_deg * degree, roll = camera->roll_deg * degree;
 	/* Facing south and tilted up to the zenith, or north and down to the nadir, leaves north at the top. */
 	const double azimuth = camera->elevation_deg >= 90 ? M_PI : camera->elevation_deg <= -90 ? 0 : camera->azimuth_deg * degree;

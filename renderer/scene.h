@@ -1,8 +1,8 @@
 /* The scene: everything a request may say, as one plain C tree.
  *
- * The server makes scenes out of JSON, the renderer only reads them. All members are values (no pointers), in the units of their
- * names (SI and degrees where the name says nothing else). A scene that reached the renderer has been validated: every number
- * lies in the range given here and is finite.
+ * The server makes scenes out of JSON, the renderer only reads them. All members are values, in the units of their names (SI and degrees
+ * where the name says nothing else); the two maps alone are held by whoever made the scene for as long as it is rendered. A scene that
+ * reached the renderer has been validated: every number lies in the range given here and is finite.
  *
  * Axes: x east, y north, z up, metres. Azimuth: degrees clockwise from north. Elevation: degrees above the horizon, unrefracted.
  */
@@ -12,7 +12,16 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { SCENE_NAME_MAX = 64 };
+enum { SCENE_NAME_MAX = 64, SCENE_HASH_SIZE = 33 };
+
+struct scene_map;
+
+/* A picture over the tile, by its name and what that holds now. */
+struct scene_map_choice {
+	char name[SCENE_NAME_MAX];   /* "": none */
+	char hash[SCENE_HASH_SIZE];  /* of the content, in hexadecimal */
+	const struct scene_map *map; /* what the renderer goes by; NULL: none */
+};
 
 enum cloud_type { CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_ALTOCUMULUS, CLOUD_CIRROCUMULUS, CLOUD_NONE, CLOUD_TYPE_COUNT };
 
@@ -30,6 +39,9 @@ enum ground_type {
 };
 
 enum projection { PROJECTION_PERSPECTIVE, PROJECTION_FISHEYE, PROJECTION_EQUIRECTANGULAR, PROJECTION_CUBEMAP, PROJECTION_COUNT };
+
+/* Faces of a cubemap in OpenEXR's order; its axes are +X east, +Y up, +Z south. */
+enum cube_face { FACE_POS_X, FACE_NEG_X, FACE_POS_Y, FACE_NEG_Y, FACE_POS_Z, FACE_NEG_Z, FACE_ALL, FACE_COUNT };
 
 enum model_name { MODEL_SLAB, MODEL_REFERENCE, MODEL_VOLUME, MODEL_PLANAR, MODEL_COUNT };
 enum shading { SHADING_SOLVED, SHADING_PAPER, SHADING_COUNT };
@@ -79,21 +91,21 @@ struct scene_dsd {
 struct scene_clouds {
 	enum cloud_type type;
 	uint32_t seed;
-	double time_s;      /* 0..1e7 */
-	double coverage;    /* 0..1 */
-	double base_m;      /* 100..12000, above ground */
-	double thickness_m; /* 0..2000, the maximum of H */
-	double tile_m;      /* 2000..200000 */
-	int resolution;     /* 64..4096, a power of two */
-	double wind_mps[2]; /* direction of motion east, north; each within 100 */
-	char map[SCENE_NAME_MAX];
+	double time_s;               /* 0..1e7 */
+	double coverage;             /* 0..1 */
+	double base_m;               /* 100..12000, above ground */
+	double thickness_m;          /* 0..2000, the maximum of H */
+	double tile_m;               /* 2000..200000 */
+	int resolution;              /* 64..4096, a power of two */
+	double wind_mps[2];          /* direction of motion east, north; each within 100 */
+	struct scene_map_choice map; /* share of thickness_m, in place of type, seed and coverage */
 };
 
 struct scene_ground {
 	enum ground_type type;
-	double albedo[3];    /* 0..1 in Rec.709 red, green, blue; used by GROUND_LAMBERT alone */
-	double albedo_scale; /* 0..2, the product with the albedo never above 1 */
-	char map[SCENE_NAME_MAX];
+	double albedo[3];            /* 0..1 in Rec.709 red, green, blue; used by GROUND_LAMBERT alone */
+	double albedo_scale;         /* 0..2, the product with the albedo never above 1 */
+	struct scene_map_choice map; /* reflectance, in place of type and albedo; the type is then GROUND_LAMBERT */
 };
 
 struct scene_atmosphere {
@@ -103,16 +115,17 @@ struct scene_atmosphere {
 
 struct scene_camera {
 	double position_m[3];    /* x, y within 1e6; z 0.1..30000 above ground */
-	double azimuth_deg;      /* 0..360 */
+	double azimuth_deg;      /* 0..360; this and the next three of perspectives alone */
 	double elevation_deg;    /* -90..90 */
 	double roll_deg;         /* -180..180, positive turns the image clockwise */
 	double vertical_fov_deg; /* 0.5..150 */
 	enum projection projection;
+	enum cube_face face; /* of a cubemap; FACE_ALL: the six of them stacked */
 };
 
 struct scene_radiosity {
 	bool enabled;
-	double tolerance; /* relative energy left after the last pass; 1e-6..1 */
+	double tolerance; /* residual to stop at (renderer/stages/radiosity_solve.h); 1e-6..1 */
 	int max_passes;   /* 0..1024 */
 };
 
@@ -161,8 +174,17 @@ bool scene_has_clouds(const struct scene *scene);
 /* Liquid water content of a droplet size distribution in g/m3: 4/3 pi rho N0 <r^3>, rho = 1e6 g/m3. Any thread. */
 double scene_dsd_liquid_water(const struct scene_dsd *dsd);
 
+/* Shape that a camera's pictures have, as the smallest whole numbers, and their width when none is said. ratio is {0, 0} where any
+ * shape goes. Any thread. */
+struct scene_shape {
+	int ratio[2]; /* width to height */
+	int width, height;
+};
+struct scene_shape scene_camera_shape(const struct scene_camera *camera);
+
 /* Axes of a camera: unit vectors to the right, up and forward in axes[0..2], each east, north, up. At the poles (elevation 90 and -90) up
- * is northwards, whatever the azimuth; a positive roll turns the picture clockwise, so the camera itself anticlockwise. Any thread. */
+ * is northwards, whatever the azimuth; a positive roll turns the picture clockwise, so the camera itself anticlockwise. A face of a cubemap
+ * has its own, the whole of one those of its first face. Any thread. */
 void scene_camera_axes(const struct scene_camera *camera, double axes[3][3]);
 
 /* Largest reflectance that a ground shows in any band, albedo_scale included; a scene's is at most 1. Any thread. */
@@ -172,6 +194,7 @@ double scene_ground_largest_reflectance(const struct scene_ground *ground);
 extern const char *const scene_cloud_type_names[];
 extern const char *const scene_ground_type_names[];
 extern const char *const scene_projection_names[];
+extern const char *const scene_face_names[]; /* FACE_ALL has none */
 extern const char *const scene_model_names[];
 extern const char *const scene_shading_names[];
 extern const char *const scene_optics_names[];

@@ -11,4 +11,5 @@ status=0
 [ $status -le 1 ] || exit $status
 gnuplot -e "data='$data'; out='docs/validation'" tests/validate/figures.gp
 cp "$data/README.md" docs/validation/README.md
+cp "$data/sky.md" docs/validation/sky.md
 exit $status

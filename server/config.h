@@ -19,6 +19,10 @@ struct config {
 	int cache_mb;         /* 1..1048576 */
 	int droplets_mb;      /* 16..1048576 */
 	int droplets_disk_mb; /* 0..16777216; 0: nothing is kept on disk */
+	int asset_max_mb;     /* 1..4096; one picture */
+	int asset_count;      /* 0..65536; 0: no uploads */
+	int assets_disk_mb;   /* 0..16777216; likewise */
+	int assets_mb;        /* 1..1048576; decoded, in memory */
 	int log_level;        /* enum log_level */
 
 	char state_dir_buffer[4096]; /* holds the default of state_dir */

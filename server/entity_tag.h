@@ -14,4 +14,7 @@ void entity_tag_of(const void *bytes, size_t size, char tag[static ENTITY_TAG_SI
 /* Does an If-None-Match header name the tag? A list or *, compared weakly. NULL and malformed headers name nothing. */
 bool entity_tag_matches(const char *if_none_match, const char *tag);
 
+/* Does an If-Match header name the tag? A list or *, compared strongly (RFC 9110, 13.1.1): weak tags name nothing. */
+bool entity_tag_is_expected(const char *if_match, const char *tag);
+
 #endif

@@ -53,6 +53,7 @@ static enum MHD_Result begin(struct request *request, const char *method)
 {
 	request_identify(request);
 	request->is_post = strcmp(method, MHD_HTTP_METHOD_POST) == 0;
+	request->is_put = strcmp(method, MHD_HTTP_METHOD_PUT) == 0;
 	request->is_head = strcmp(method, MHD_HTTP_METHOD_HEAD) == 0;
 	snprintf(request->method, sizeof request->method, "%s", method);
 	request->route = routes_find(request->path);
@@ -64,8 +65,10 @@ static enum MHD_Result begin(struct request *request, const char *method)
 	if (request->is_post && !negotiation_is_json(request_header(request, "Content-Type")))
 		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE,
 						 "The body must be JSON, sent as Content-Type: application/json.");
-	if (request->is_post && is_encoded(request))
+	if ((request->is_post || request->is_put) && is_encoded(request))
 		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE, "The body must be sent without a Content-Encoding.");
+	if (request->is_put)
+		return route_asset_begin(request);
 	if (announces_too_much(request))
 		return response_send_new_problem(request, PROBLEM_TOO_LARGE, "A body has at most %d bytes.", REQUEST_BODY_MAX);
 	return MHD_YES;
@@ -73,8 +76,10 @@ static enum MHD_Result begin(struct request *request, const char *method)
 
 static enum MHD_Result take_body(struct request *request, const char *data, size_t size)
 {
+	if (request->is_put)
+		return route_asset_take(request, data, size);
 	if (request->body.length + size > REQUEST_BODY_MAX)
-		return response_refuse_body(request);
+		return response_refuse_body(request, REQUEST_BODY_MAX);
 	text_append(&request->body, data, size);
 	return MHD_YES;
 }

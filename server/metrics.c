@@ -8,15 +8,16 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/optics", "/v1/slab", "/v1/sun",  "/v1/presets", "/",
-						     "/openapi.yaml", "/healthz",   "/readyz",  "/metrics", "other"};
+static const char *const route_names[ROUTE_COUNT] = {"/v1/render", "/v1/optics",      "/v1/slab",    "/v1/sky", "/v1/sun",
+						     "/v1/assets", "/v1/assets/NAME", "/v1/presets", "/",       "/openapi.yaml",
+						     "/healthz",   "/readyz",         "/metrics",    "other"};
 static const char *const rejection_names[REJECTION_COUNT] = {"full", "starting", "shutting_down"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
 static const char *const source_names[DROPLET_SOURCE_COUNT] = {
 	[DROPLETS_FROM_MEMORY] = "memory", [DROPLETS_FROM_DISK] = "disk", [DROPLETS_COMPUTED] = "computed"};
 
 /* Every status that is sent; the last stands for all others. */
-static const unsigned statuses[] = {200, 304, 400, 404, 405, 406, 413, 415, 422, 499, 500, 503, 504, 0};
+static const unsigned statuses[] = {200, 201, 204, 304, 400, 404, 405, 406, 412, 413, 415, 422, 499, 500, 503, 504, 507, 0};
 enum { STATUS_COUNT = sizeof statuses / sizeof *statuses };
 
 /* Upper bounds in seconds: half a millisecond to a minute. */
@@ -218,6 +219,16 @@ static void write_droplets(struct text *text, const struct droplet_store_counts 
 	text_printf(text, "stratus_droplet_tables_bytes %llu\n", (unsigned long long)counts->memory_bytes);
 }
 
+static void write_assets(struct text *text, const struct metrics_now *now)
+{
+	write_family(text, "assets", "gauge", "Uploaded pictures.");
+	text_printf(text, "stratus_assets %zu\n", now->assets);
+	write_family(text, "assets_bytes", "gauge", "Disk space of uploaded pictures.");
+	text_printf(text, "stratus_assets_bytes %llu\n", (unsigned long long)now->asset_bytes);
+	write_family(text, "asset_maps_bytes", "gauge", "Memory of decoded pictures.");
+	text_printf(text, "stratus_asset_maps_bytes %llu\n", (unsigned long long)now->asset_map_bytes);
+}
+
 static void write_label(struct text *text, const char *name, const char *value)
 {
 	text_printf(text, "%s=\"", name);
@@ -272,6 +283,7 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_queue(&text, copy, now);
 	write_tracings(&text, copy, now);
 	write_droplets(&text, &now->droplets);
+	write_assets(&text, now);
 	write_infos(&text, now->info);
 	write_process(&text);
 	text_add(&text, "# EOF\n");

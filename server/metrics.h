@@ -12,7 +12,10 @@ enum metrics_route {
 	ROUTE_RENDER,
 	ROUTE_OPTICS,
 	ROUTE_SLAB,
+	ROUTE_SKY,
 	ROUTE_SUN,
+	ROUTE_ASSETS,
+	ROUTE_ASSET,
 	ROUTE_PRESETS,
 	ROUTE_INDEX,
 	ROUTE_OPENAPI,
@@ -48,6 +51,8 @@ struct metrics_now {
 	size_t queue_depth, queue_limit, requests_in_flight;
 	size_t tracings_waiting, tracings_limit;
 	struct droplet_store_counts droplets;
+	size_t assets;
+	uint64_t asset_bytes, asset_map_bytes; /* on disk; decoded, in memory */
 };
 
 /* The caller frees; NULL when out of memory. */

@@ -21,9 +21,11 @@ static const struct kind kinds[PROBLEM_KIND_COUNT] = {
 	[PROBLEM_NOT_FOUND] = {404, "not-found", "Nothing is here"},
 	[PROBLEM_METHOD] = {405, "method-not-allowed", "Method not allowed"},
 	[PROBLEM_NOT_ACCEPTABLE] = {406, "not-acceptable", "No acceptable image type"},
+	[PROBLEM_PRECONDITION] = {412, "precondition-failed", "The condition does not hold"},
 	[PROBLEM_TOO_LARGE] = {413, "body-too-large", "The body is too large"},
 	[PROBLEM_MEDIA_TYPE] = {415, "unsupported-media-type", "Unsupported media type"},
 	[PROBLEM_INVALID] = {422, "invalid-scene", "Invalid parameters"},
+	[PROBLEM_BAD_ASSET] = {422, "invalid-asset", "The picture cannot be used"},
 	[PROBLEM_INTERNAL] = {500, "internal", "Internal error"},
 	[PROBLEM_RENDER_FAILED] = {500, "render-failed", "The image could not be made"},
 	[PROBLEM_QUEUE_FULL] = {503, "queue-full", "Too much to do"},
@@ -32,7 +34,9 @@ static const struct kind kinds[PROBLEM_KIND_COUNT] = {
 	[PROBLEM_NO_MEMORY] = {503, "no-memory", "No memory for this image"},
 	[PROBLEM_STARTING] = {503, "starting", "Not ready yet"},
 	[PROBLEM_SHUTTING_DOWN] = {503, "shutting-down", "Shutting down"},
+	[PROBLEM_UPLOADS_FULL] = {503, "queue-full", "Too much to do"},
 	[PROBLEM_DEADLINE] = {504, "deadline-passed", "The deadline passed"},
+	[PROBLEM_STORAGE_FULL] = {507, "storage-full", "No room for this asset"},
 };
 
 void problem_finish(struct problem *problem)

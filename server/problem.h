@@ -15,9 +15,11 @@ enum problem_kind {
 	PROBLEM_NOT_FOUND,      /* 404 */
 	PROBLEM_METHOD,         /* 405 */
 	PROBLEM_NOT_ACCEPTABLE, /* 406 */
+	PROBLEM_PRECONDITION,   /* 412 */
 	PROBLEM_TOO_LARGE,      /* 413 */
 	PROBLEM_MEDIA_TYPE,     /* 415 */
 	PROBLEM_INVALID,        /* 422, with `errors` */
+	PROBLEM_BAD_ASSET,      /* 422 */
 	PROBLEM_INTERNAL,       /* 500 */
 	PROBLEM_RENDER_FAILED,  /* 500 */
 	PROBLEM_QUEUE_FULL,     /* 503 */
@@ -26,7 +28,9 @@ enum problem_kind {
 	PROBLEM_NO_MEMORY,      /* 503 */
 	PROBLEM_STARTING,       /* 503 */
 	PROBLEM_SHUTTING_DOWN,  /* 503 */
+	PROBLEM_UPLOADS_FULL,   /* 503 */
 	PROBLEM_DEADLINE,       /* 504 */
+	PROBLEM_STORAGE_FULL,   /* 507 */
 	PROBLEM_KIND_COUNT
 };
 
@@ -57,7 +61,7 @@ __attribute__((format(printf, 3, 4))) void problem_add(struct problem *problem, 
 /* Is a member at or below this pointer among the errors? */
 bool problem_mentions(const struct problem *problem, const char *pointer);
 
-/* The HTTP status of a kind, 400..504. */
+/* The HTTP status of a kind, 400..507. */
 unsigned problem_status(enum problem_kind kind);
 
 /* JSON text (free), NULL when out of memory. The request id is part of `instance`; retry_after_seconds 0: not said. */

@@ -19,8 +19,7 @@ static int hex_digit(char c)
 	return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-/* Decodes in place. false for what is no escape, and for NUL. */
-static bool decode(char *text)
+bool query_decode(char *text)
 {
 	char *out = text;
 	for (const char *in = text; *in; in++) {
@@ -53,7 +52,7 @@ static bool add_pair(char *member, struct query *query)
 		*value++ = '\0';
 	else
 		value = member + strlen(member);
-	if (!decode(member) || !decode(value) || !is_utf8(member) || !is_utf8(value))
+	if (!query_decode(member) || !query_decode(value) || !is_utf8(member) || !is_utf8(value))
 		return false;
 	query->pairs[query->count++] = (struct query_pair){member, value};
 	return true;

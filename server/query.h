@@ -26,4 +26,7 @@ struct query {
 bool query_parse(const char *text, struct query *query, struct problem *problem);
 void query_finish(struct query *query);
 
+/* Decodes percent-escapes in place. false for what is no escape, and for NUL. */
+bool query_decode(char *text);
+
 #endif

@@ -9,18 +9,19 @@
 #include "renderer/renderer.h"
 
 enum render_outcome {
-	RENDER_OUTCOME_OK,      /* job->frame is set and belongs to the job's owner */
+	RENDER_OUTCOME_OK,      /* job->frame (or job->light) is set and belongs to the job's owner */
 	RENDER_OUTCOME_EXPIRED, /* the deadline passed, in the queue or between passes */
 	RENDER_OUTCOME_ABANDONED /* nobody waits for it any more */,
 	RENDER_OUTCOME_NO_MEMORY, /* this scene is too large for the device as it is loaded; others may do */
 	RENDER_OUTCOME_FAILED
 };
 
-/* One picture to render. Belongs to its maker, who keeps it until `finished` was called. */
+/* One picture to render, or the light of a sky to compute. Belongs to its maker, who keeps it until `finished` was called. */
 struct render_job {
 	const struct scene *scene;
-	double deadline_ms; /* on the clock of clock.h */
-	double queued_ms;   /* likewise, set by render_queue_push */
+	const struct sky_directions *directions; /* NULL: a picture; else the light of the scene's clear sky there */
+	double deadline_ms;                      /* on the clock of clock.h */
+	double queued_ms;                        /* likewise, set by render_queue_push */
 
 	/* Asked at dequeue and between passes: does nobody wait any more? */
 	bool (*abandoned)(struct render_job *job);
@@ -35,6 +36,7 @@ struct render_job {
 	enum render_outcome outcome;
 	double waited_ms; /* in queues */
 	struct frame frame;
+	struct sky_light light;  /* likewise */
 	struct render_job *next; /* of the queue */
 };
 

@@ -34,7 +34,9 @@ static enum render_outcome render(struct render_thread *thread, struct render_jo
 {
 	if (render_job_is_over(job))
 		return job->outcome;
-	enum render_result result = renderer_render(thread->renderer, job->scene, is_cancelled, job, &job->frame);
+	enum render_result result =
+		job->directions ? renderer_sky_light(thread->renderer, job->scene, job->directions, is_cancelled, job, &job->light)
+				: renderer_render(thread->renderer, job->scene, is_cancelled, job, &job->frame);
 	if (result == RENDER_CANCELLED)
 		return job->outcome;
 	/* A scene that does not fit says nothing about the next one: only a failing device turns the daemon's health. */

@@ -23,7 +23,7 @@ struct service;
 typedef enum MHD_Result request_handler(struct request *request);
 
 struct route {
-	const char *path;
+	const char *path;  /* with a slash at its end: everything below */
 	const char *allow; /* methods, as the Allow header says them */
 	request_handler *handler;
 	enum metrics_route metrics;
@@ -35,7 +35,7 @@ struct request {
 	char *path;                        /* as sent, without the query */
 	const char *query;                 /* as sent, behind the question mark; NULL: none */
 	char method[8];                    /* for the log, cut when longer */
-	bool is_post, is_head;
+	bool is_post, is_put, is_head;
 	bool is_accepted; /* read to its end: counted in service->in_flight */
 	double started_ms;
 	char id[REQUEST_ID_SIZE];

@@ -70,6 +70,7 @@ static unsigned retry_after(const struct request *request)
 		return service_tracing_retry_seconds(request->service);
 	case PROBLEM_COMPUTERS_FULL:
 		return service_computing_retry_seconds(request->service);
+	case PROBLEM_UPLOADS_FULL:
 	case PROBLEM_STARTING:
 		return 2;
 	case PROBLEM_SHUTTING_DOWN:
@@ -136,13 +137,13 @@ enum MHD_Result response_send_json(struct request *request, unsigned status, jso
 	return response_send(request, status, response);
 }
 
-enum MHD_Result response_refuse_body(struct request *request)
+enum MHD_Result response_refuse_body(struct request *request, uint64_t limit)
 {
 	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
 	struct text answer = {0};
 	char timing[SERVER_TIMING_SIZE];
 	format_timing(request, timing);
-	problem_set(&request->problem, PROBLEM_TOO_LARGE, "A body has at most %d bytes.", REQUEST_BODY_MAX);
+	problem_set(&request->problem, PROBLEM_TOO_LARGE, "A body has at most %llu bytes.", (unsigned long long)limit);
 	char *body = problem_to_json(&request->problem, request->id, 0);
 	if (body && info) {
 		text_printf(&answer,

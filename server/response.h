@@ -6,6 +6,8 @@
 
 /* Cache-Control of what a scene or a query determines: kept, and asked for again by its entity tag after an hour. */
 #define CACHE_KEEP "public, max-age=3600"
+/* Of what may change under its address at any time: kept, but asked for again by its entity tag every time. */
+#define CACHE_ASK  "no-cache"
 #define CACHE_NONE "no-store"
 
 /* Takes over malloc'd data (also on failure). NULL when out of memory. */
@@ -27,8 +29,8 @@ enum MHD_Result response_send_document(struct request *request, char *text, cons
 /* Likewise JSON; root is taken over. */
 enum MHD_Result response_send_json(struct request *request, unsigned status, json_t *root, const char *cache_control);
 
-/* 413 while a body is still coming in. libmicrohttpd takes no response then, so the answer is written to the socket; the connection
- * closes. */
-enum MHD_Result response_refuse_body(struct request *request);
+/* 413 while a body of more than `limit` bytes is still coming in. libmicrohttpd takes no response then, so the answer is written to the
+ * socket; the connection closes. */
+enum MHD_Result response_refuse_body(struct request *request, uint64_t limit);
 
 #endif

@@ -1,8 +1,8 @@
 /* /v1/render: a scene in, an image out.
  *
- * The HTTP thread reads and checks the scene and answers what needs no rendering; then the request is suspended and goes, past the thread
- * that prepares its droplets where they are new, from the queue to the render thread, from there to a worker that encodes, and back to the
- * HTTP thread with its image.
+ * The HTTP thread reads and checks the scene and answers what needs no rendering; then the request is suspended and goes, past the threads
+ * that decode its maps and prepare its droplets where they are new, from the queue to the render thread, from there to a worker that
+ * encodes, and back to the HTTP thread with its image.
  */
 #include "server/routes.h"
 
@@ -13,6 +13,7 @@
 #include "server/negotiation.h"
 #include "server/query.h"
 #include "server/response.h"
+#include "server/scene_assets.h"
 #include "server/scene_canonical.h"
 #include "server/scene_json.h"
 #include "server/scene_query.h"
@@ -25,9 +26,12 @@
 
 struct render_work {
 	struct render_job job; /* for the render thread */
+	struct work decode;    /* for the decoder, when a map is not in memory */
 	struct work encode;    /* for the worker */
 	struct request *request;
 	struct scene_input input;
+	struct scene_assets assets;
+	double decoding_since_ms, decode_ms[SCENE_ASSETS_COUNT];
 	char *canonical, *location;
 	char key[DIGEST_SIZE], tag[ENTITY_TAG_SIZE];
 	bool refused; /* the queue was full */
@@ -39,6 +43,7 @@ static void work_destroy(void *context)
 {
 	struct render_work *work = context;
 	frame_finish(&work->job.frame);
+	scene_assets_finish(&work->input.scene, &work->assets);
 	free(work->image.data);
 	free(work->canonical);
 	free(work->location);
@@ -79,8 +84,9 @@ static void refuse_the_other_place(struct request *request)
 }
 
 /* Fills request->problem when there is no such picture to be had. */
-static void read_scene(struct request *request, struct scene_input *input)
+static void read_scene(struct request *request, struct render_work *work)
 {
+	struct scene_input *input = &work->input;
 	*input = scene_input_default();
 	refuse_the_other_place(request);
 	if (request->problem.kind != PROBLEM_NONE)
@@ -94,6 +100,7 @@ static void read_scene(struct request *request, struct scene_input *input)
 	enum image_format *format = &input->scene.output.format;
 	bool acceptable = negotiation_choose(request_header(request, "Accept"), *format, format);
 	scene_rules_apply(input, &request->problem);
+	scene_assets_find(request->service->assets, &input->scene, &work->assets, &request->problem);
 	if (!acceptable)
 		problem_set(&request->problem, PROBLEM_NOT_ACCEPTABLE, "The image would be %s, which the Accept header excludes.",
 			    image_content_types[*format]);
@@ -127,7 +134,9 @@ static enum MHD_Result send_image(struct request *request, unsigned status, stru
 		response_set(response, "Content-Type", image_content_types[work->input.scene.output.format]);
 	response_set(response, "ETag", work->tag);
 	response_set(response, "Vary", "Accept");
-	response_set(response, "Cache-Control", CACHE_KEEP);
+	/* The content of a map may change behind its name. */
+	const bool named = *work->input.scene.clouds.map.name || *work->input.scene.ground.map.name;
+	response_set(response, "Cache-Control", named ? CACHE_ASK : CACHE_KEEP);
 	response_set(response, "X-Scene-Key", work->key);
 	response_set(response, "Content-Location", work->location);
 	return response_send(request, status, response);
@@ -161,6 +170,8 @@ static enum MHD_Result finish(struct request *request)
 	}
 	timings_set_frame(&request->timings, &work->job.frame);
 	timings_add_optics(&request->timings, work->job.prepared_ms, work->job.prepared);
+	timings_add(&request->timings, TIMING_FIELD, work->decode_ms[0]);
+	timings_add(&request->timings, TIMING_SKY, work->decode_ms[1]); /* the ground is part of it */
 	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
 	struct MHD_Response *response = response_create((char *)work->image.data, work->image.size);
 	work->image.data = NULL;
@@ -215,6 +226,7 @@ static void on_rendered(struct render_job *job)
 {
 	struct render_work *work = (struct render_work *)((char *)job - offsetof(struct render_work, job));
 	preparation_release(work->request->service->preparation, job);
+	scene_assets_release(&work->input.scene);
 	if (job->outcome == RENDER_OUTCOME_FAILED)
 		log_error("request %s: rendering failed", work->request->id);
 	if (job->outcome == RENDER_OUTCOME_OK)
@@ -225,20 +237,47 @@ static void on_rendered(struct render_job *job)
 
 /* --- the way through ------------------------------------------------------------------------------------------------------------ */
 
+/* Ends the job that a full queue refused. */
+static void refuse(struct render_work *work)
+{
+	work->refused = true;
+	request_resume(work->request);
+}
+
+static bool is_over(void *context)
+{
+	return render_job_is_over(context);
+}
+
+static void decode(struct work *base)
+{
+	struct render_work *work = (struct render_work *)((char *)base - offsetof(struct render_work, decode));
+	struct service *service = work->request->service;
+	work->job.waited_ms += clock_now_ms() - work->decoding_since_ms;
+	work->job.outcome = RENDER_OUTCOME_FAILED;
+	if (render_job_is_over(&work->job) ||
+	    !scene_assets_decode(service->maps, service->images, &work->input.scene, &work->assets, is_over, &work->job, work->decode_ms))
+		hand_back(work);
+	else if (!preparation_push(service->preparation, &work->job))
+		refuse(work);
+}
+
 static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 {
 	struct render_work *work = request->work;
+	struct service *service = request->service;
 	work->job.scene = &work->input.scene;
 	work->job.deadline_ms = deadline_ms;
 	work->job.abandoned = is_abandoned;
 	work->job.finished = on_rendered;
 	work->encode.run = encode;
+	work->decode.run = decode;
 	/* Suspended first: the render thread may be done before preparation_push returns. */
 	request_suspend(request, finish);
-	if (!preparation_push(request->service->preparation, &work->job)) {
-		work->refused = true;
-		request_resume(request);
-	}
+	work->decoding_since_ms = clock_now_ms();
+	if (!(scene_assets_take(service->maps, &work->input.scene, &work->assets) ? preparation_push(service->preparation, &work->job)
+										  : worker_pool_try(service->decoders, &work->decode)))
+		refuse(work);
 	return MHD_YES;
 }
 
@@ -248,10 +287,11 @@ enum MHD_Result route_render(struct request *request)
 	if (!work)
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
 	work->request = request;
+	scene_assets_init(&work->assets);
 	request->work = work;
 	request->work_destroy = work_destroy;
 
-	read_scene(request, &work->input);
+	read_scene(request, work);
 	double deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);

@@ -49,11 +49,6 @@ enum MHD_Result route_presets(struct request *request)
 	return response_send_json(request, MHD_HTTP_OK, json_pack("{s:o}", "presets", presets), CACHE_KEEP);
 }
 
-enum MHD_Result route_later(struct request *request)
-{
-	return response_send_new_problem(request, PROBLEM_NOT_FOUND, "This call is not available yet in this release.");
-}
-
 enum MHD_Result route_unknown(struct request *request)
 {
 	return response_send_new_problem(request, PROBLEM_NOT_FOUND, "There is no such address; /openapi.yaml lists those that exist.");

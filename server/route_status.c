@@ -44,6 +44,8 @@ enum MHD_Result route_metrics(struct request *request)
 		.tracings_waiting = worker_pool_waiting(service->tracers),
 		.tracings_limit = SERVICE_TRACINGS_MAX,
 	};
+	asset_store_usage(service->assets, &now.assets, &now.asset_bytes);
+	now.asset_map_bytes = asset_maps_bytes(service->maps);
 	if (service->ready)
 		now.droplets = droplet_store_counts(render_thread_droplets(service->render_thread));
 	return response_send_document(request, metrics_format(service->metrics, &now),

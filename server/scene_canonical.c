@@ -17,9 +17,10 @@ static void write_number(double value, struct text *text)
 	text_add(text, number);
 }
 
+/* A choice that is said by leaving the member out has no word. */
 static void write_word(const char *word, enum style style, struct text *text)
 {
-	text_printf(text, style == STYLE_JSON ? "\"%s\"" : "%s", word);
+	text_printf(text, style == STYLE_JSON ? "\"%s\"" : "%s", word ? word : "");
 }
 
 static void write_choices(const struct scene_field *field, uint32_t set, enum style style, struct text *text)
@@ -82,6 +83,8 @@ static void write_value(const struct scene_field *field, const struct scene_inpu
 		write_choices(field, *(const uint32_t *)value, style, text);
 		break;
 	case FIELD_NAME:
+	case FIELD_ASSET:
+	case FIELD_HASH:
 		write_word(value, style, text);
 		break;
 	}
@@ -89,10 +92,33 @@ static void write_value(const struct scene_field *field, const struct scene_inpu
 		text_add(text, "]");
 }
 
+/* Panoramas look everywhere, and only a cubemap of one face has that face. */
+static bool is_meaningful_to_camera(const char *name, const struct scene_camera *camera)
+{
+	if (strcmp(name, "position_m") == 0 || strcmp(name, "projection") == 0)
+		return true;
+	if (strcmp(name, "face") == 0)
+		return camera->projection == PROJECTION_CUBEMAP && camera->face != FACE_ALL;
+	return camera->projection == PROJECTION_PERSPECTIVE;
+}
+
+static bool is_one_of(const char *name, const char *const *names)
+{
+	return name_index(names, name) >= 0;
+}
+
 /* Has the member a meaning in this scene? Those without are refused when given, so the canonical form must not hold them. */
 static bool is_meaningful(const struct scene_field *field, const struct scene *scene)
 {
+	static const char *const procedural[] = {"type", "seed", "coverage", "albedo", NULL};
+	const bool clouds = strcmp(field->section, "clouds") == 0, ground = strcmp(field->section, "ground") == 0;
+	static const struct scene_map_choice none;
+	const struct scene_map_choice *map = clouds ? &scene->clouds.map : ground ? &scene->ground.map : &none;
 	if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER))
+		return false;
+	if (field->type == FIELD_ASSET || field->type == FIELD_HASH)
+		return field->type == FIELD_ASSET ? *map->name : *map->hash;
+	if (*map->name && is_one_of(field->name, procedural))
 		return false;
 	if (strcmp(field->section, "sun") == 0) {
 		const bool is_angle = strcmp(field->name, "elevation_deg") == 0 || strcmp(field->name, "azimuth_deg") == 0;
@@ -102,6 +128,8 @@ static bool is_meaningful(const struct scene_field *field, const struct scene *s
 		return scene->model.paths != SCENE_PATHS_ALL;
 	if (strcmp(field->section, "ground") == 0 && strcmp(field->name, "albedo") == 0)
 		return scene->ground.type == GROUND_LAMBERT;
+	if (strcmp(field->section, "camera") == 0)
+		return is_meaningful_to_camera(field->name, &scene->camera);
 	return true;
 }
 
@@ -133,18 +161,31 @@ char *scene_canonical(const struct scene *scene)
 	return text_take(&text);
 }
 
+/* Defaults beside this scene's projection. */
+static struct scene_input usual_input(const struct scene *scene)
+{
+	struct scene_input input = scene_input_default();
+	input.scene.output.width = scene_camera_shape(&scene->camera).width;
+	input.scene.output.height = scene_camera_shape(&scene->camera).height;
+	return input;
+}
+
 char *scene_canonical_query(const struct scene *scene)
 {
-	const struct scene_input input = {.scene = *scene}, defaults = scene_input_default();
+	const struct scene_input input = {.scene = *scene}, defaults = usual_input(scene);
 	struct text text = {0};
 	for (const struct scene_field *field = scene_fields; field->section; field++) {
 		struct text value = {0}, usual = {0};
+		if (!is_meaningful(field, scene))
+			continue;
+		if (field->type == FIELD_HASH)
+			continue; /* the address names the asset, whatever that holds when it is asked */
 		write_value(field, &input, STYLE_QUERY, &value);
 		write_value(field, &defaults, STYLE_QUERY, &usual);
 		/* Time and place stand together or not at all. */
 		bool differs = value.failed || usual.failed || strcmp(value.data, usual.data) != 0 ||
 			       (scene->sun.by_time && strcmp(field->section, "sun") == 0);
-		if (is_meaningful(field, scene) && differs)
+		if (differs)
 			text_printf(&text, "%s%s.%s=%s", text.length ? "&" : "", field->section, field->name,
 				    value.failed ? "" : value.data);
 		text.failed |= value.failed || usual.failed;

@@ -20,8 +20,7 @@ const struct scene_field scene_fields[] = {
 	/* rn = re / (gamma + 2): the range of re is checked once both are known. */
 	{"dsd", "characteristic_radius_um", FIELD_NUMBER, AT(characteristic_radius_um), BETWEEN(0.045, 10), .flags = FIELD_INPUT_ONLY},
 
-	{"clouds", "type", FIELD_CHOICE, AT(scene.clouds.type), .choices = scene_cloud_type_names,
-	 .choices_later = LATER(CLOUD_ALTOCUMULUS) | LATER(CLOUD_CIRROCUMULUS)},
+	{"clouds", "type", FIELD_CHOICE, AT(scene.clouds.type), .choices = scene_cloud_type_names},
 	{"clouds", "seed", FIELD_SEED, AT(scene.clouds.seed), BETWEEN(0, UINT32_MAX)},
 	{"clouds", "time_s", FIELD_NUMBER, AT(scene.clouds.time_s), BETWEEN(0, 1e7)},
 	{"clouds", "coverage", FIELD_NUMBER, AT(scene.clouds.coverage), BETWEEN(0, 1)},
@@ -30,13 +29,14 @@ const struct scene_field scene_fields[] = {
 	{"clouds", "tile_m", FIELD_NUMBER, AT(scene.clouds.tile_m), BETWEEN(2000, 200000)},
 	{"clouds", "resolution", FIELD_INTEGER, AT(scene.clouds.resolution), BETWEEN(64, 4096), .flags = FIELD_POWER_OF_TWO},
 	{"clouds", "wind_mps", FIELD_NUMBERS, AT(scene.clouds.wind_mps), .range = {{-100, 100}, {-100, 100}}, .count = 2},
-	{"clouds", "map", FIELD_NAME, AT(scene.clouds.map), .flags = FIELD_LATER},
+	{"clouds", "map", FIELD_ASSET, AT(scene.clouds.map.name)},
+	{"clouds", "map_hash", FIELD_HASH, AT(scene.clouds.map.hash)},
 
-	{"ground", "type", FIELD_CHOICE, AT(scene.ground.type), .choices = scene_ground_type_names,
-	 .choices_later = LATER(GROUND_GRASS) | LATER(GROUND_SOIL) | LATER(GROUND_SAND)},
+	{"ground", "type", FIELD_CHOICE, AT(scene.ground.type), .choices = scene_ground_type_names},
 	{"ground", "albedo", FIELD_NUMBERS, AT(scene.ground.albedo), .range = {{0, 1}, {0, 1}, {0, 1}}, .count = 3},
 	{"ground", "albedo_scale", FIELD_NUMBER, AT(scene.ground.albedo_scale), BETWEEN(0, 2)},
-	{"ground", "map", FIELD_NAME, AT(scene.ground.map), .flags = FIELD_LATER},
+	{"ground", "map", FIELD_ASSET, AT(scene.ground.map.name)},
+	{"ground", "map_hash", FIELD_HASH, AT(scene.ground.map.hash)},
 
 	{"atmosphere", "aerosol_optical_depth", FIELD_NUMBER, AT(scene.atmosphere.aerosol_optical_depth), BETWEEN(0, 2)},
 	{"atmosphere", "ozone_du", FIELD_NUMBER, AT(scene.atmosphere.ozone_du), BETWEEN(0, 600)},
@@ -46,9 +46,8 @@ const struct scene_field scene_fields[] = {
 	{"camera", "elevation_deg", FIELD_NUMBER, AT(scene.camera.elevation_deg), BETWEEN(-90, 90)},
 	{"camera", "roll_deg", FIELD_NUMBER, AT(scene.camera.roll_deg), BETWEEN(-180, 180)},
 	{"camera", "vertical_fov_deg", FIELD_NUMBER, AT(scene.camera.vertical_fov_deg), BETWEEN(0.5, 150)},
-	{"camera", "projection", FIELD_CHOICE, AT(scene.camera.projection), .choices = scene_projection_names,
-	 .choices_later = LATER(PROJECTION_FISHEYE) | LATER(PROJECTION_EQUIRECTANGULAR) | LATER(PROJECTION_CUBEMAP)},
-	{"camera", "face", FIELD_NAME, AT(face), .flags = FIELD_LATER | FIELD_INPUT_ONLY},
+	{"camera", "projection", FIELD_CHOICE, AT(scene.camera.projection), .choices = scene_projection_names},
+	{"camera", "face", FIELD_CHOICE, AT(scene.camera.face), .choices = scene_face_names},
 
 	{"radiosity", "enabled", FIELD_BOOLEAN, AT(scene.radiosity.enabled)},
 	{"radiosity", "tolerance", FIELD_NUMBER, AT(scene.radiosity.tolerance), BETWEEN(1e-6, 1)},

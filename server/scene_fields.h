@@ -18,7 +18,9 @@ enum field_type {
 	FIELD_CHOICE,         /* an enumeration, by `choices` */
 	FIELD_CHOICES,        /* uint32_t bit set, by `choices` */
 	FIELD_TIME,           /* RFC 3339 text, kept as a Julian day in a double */
-	FIELD_NAME            /* char[SCENE_NAME_MAX] */
+	FIELD_NAME,           /* char[SCENE_NAME_MAX] */
+	FIELD_ASSET,          /* likewise, the name of an asset; "": none */
+	FIELD_HASH            /* char[SCENE_HASH_SIZE], what the asset beside it must hold; "": whatever it does */
 };
 
 enum field_flag {
@@ -48,7 +50,6 @@ struct scene_field {
 struct scene_input {
 	struct scene scene;
 	double characteristic_radius_um;
-	char face[SCENE_NAME_MAX];
 	uint64_t given; /* bit i: scene_fields[i] was given, valid or not */
 };
 

@@ -1,5 +1,6 @@
 #include "server/scene_json.h"
 
+#include "server/asset_store.h"
 #include "server/number_text.h"
 #include "server/rfc3339.h"
 
@@ -130,6 +131,24 @@ static void read_time(const json_t *value, const char *pointer, double *julian_d
 		problem_add(problem, pointer, "must be a time as in RFC 3339, such as \"2024-06-21T12:00:00Z\"");
 }
 
+static void read_asset(const json_t *value, const char *pointer, char name[static SCENE_NAME_MAX], struct problem *problem)
+{
+	if (json_is_string(value) && json_string_length(value) < SCENE_NAME_MAX && asset_name_is_valid(json_string_value(value)))
+		strcpy(name, json_string_value(value));
+	else
+		problem_add(problem, pointer, "must be the name of an asset, 1 to %d letters, digits, '-', '_' and '.', no dot first",
+			    SCENE_NAME_MAX - 1);
+}
+
+static void read_hash(const json_t *value, const char *pointer, char hash[static SCENE_HASH_SIZE], struct problem *problem)
+{
+	const char *text = json_is_string(value) ? json_string_value(value) : "";
+	if (strlen(text) == SCENE_HASH_SIZE - 1 && strspn(text, "0123456789abcdef") == SCENE_HASH_SIZE - 1)
+		strcpy(hash, text);
+	else
+		problem_add(problem, pointer, "must be %d hexadecimal digits", SCENE_HASH_SIZE - 1);
+}
+
 void scene_json_read_field(const struct scene_field *field, const json_t *value, const char *pointer, struct scene_input *input,
 			   struct problem *problem)
 {
@@ -174,6 +193,12 @@ void scene_json_read_field(const struct scene_field *field, const json_t *value,
 		break;
 	case FIELD_TIME:
 		read_time(value, pointer, target, problem);
+		break;
+	case FIELD_ASSET:
+		read_asset(value, pointer, target, problem);
+		break;
+	case FIELD_HASH:
+		read_hash(value, pointer, target, problem);
 		break;
 	case FIELD_NAME: /* names come with the assets they name; until then FIELD_LATER has answered */
 		break;

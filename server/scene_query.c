@@ -49,6 +49,8 @@ static json_t *value_to_json(const struct scene_field *field, const char *value)
 	case FIELD_CHOICE:
 	case FIELD_TIME:
 	case FIELD_NAME:
+	case FIELD_ASSET:
+	case FIELD_HASH:
 		break;
 	}
 	return json_string(value);

@@ -73,20 +73,29 @@ static void resolve_dsd(struct scene_input *input, struct problem *problem)
 
 static void check_clouds(const struct scene_input *input, struct problem *problem)
 {
-	static const char *const procedural[] = {"type", "seed", "coverage", NULL};
+	static const char *const procedural[] = {"type", "seed", "coverage", NULL}, *const hash[] = {"map_hash", NULL};
 	if (given(input, "clouds", "map"))
 		refuse_given(input, "clouds", procedural, "does not go with a map", problem);
+	else
+		refuse_given(input, "clouds", hash, "goes with a map only", problem);
 }
 
 static void check_ground(struct scene_input *input, struct problem *problem)
 {
 	static const char *const albedo[] = {"albedo", NULL};
-	static const char *const procedural[] = {"type", "albedo", NULL};
+	static const char *const procedural[] = {"type", "albedo", NULL}, *const hash[] = {"map_hash", NULL};
 	struct scene_ground *ground = &input->scene.ground;
 	if (given(input, "ground", "map"))
 		refuse_given(input, "ground", procedural, "does not go with a map", problem);
+	else
+		refuse_given(input, "ground", hash, "goes with a map only", problem);
 	if (problem_mentions(problem, "/ground"))
 		return;
+	if (*ground->map.name) { /* a Lambertian ground whose reflectance the map says; what it reaches is checked with the map */
+		ground->type = GROUND_LAMBERT;
+		ground->albedo[0] = ground->albedo[1] = ground->albedo[2] = 0;
+		return;
+	}
 	if (ground->type != GROUND_LAMBERT) {
 		refuse_given(input, "ground", albedo, "goes with the type lambert only", problem);
 		/* One scene, one content: an unused albedo must not make two scenes of one. */
@@ -100,10 +109,13 @@ static void check_ground(struct scene_input *input, struct problem *problem)
 static void check_camera(const struct scene_input *input, struct problem *problem)
 {
 	static const char *const directions[] = {"azimuth_deg", "elevation_deg", "roll_deg", "vertical_fov_deg", NULL};
+	static const char *const face[] = {"face", NULL};
 	const struct scene *scene = &input->scene;
 	const struct scene_clouds *clouds = &scene->clouds;
 	if (scene->camera.projection != PROJECTION_PERSPECTIVE)
 		refuse_given(input, "camera", directions, "does not go with a panorama", problem);
+	if (scene->camera.projection != PROJECTION_CUBEMAP && !problem_mentions(problem, "/camera/projection"))
+		refuse_given(input, "camera", face, "goes with the projection cubemap only", problem);
 	if (problem_mentions(problem, "/camera/position_m") || problem_mentions(problem, "/clouds"))
 		return;
 	double z = scene->camera.position_m[2];
@@ -111,6 +123,51 @@ static void check_camera(const struct scene_input *input, struct problem *proble
 	if (has_clouds && scene->model.name == MODEL_SLAB && z >= clouds->base_m && z <= clouds->base_m + clouds->thickness_m)
 		problem_add(problem, "/camera/position_m/2", "lies inside the cloud layer (%g to %g m), where the slab model has no view",
 			    clouds->base_m, clouds->base_m + clouds->thickness_m);
+}
+
+/* One side of a picture that follows from the other. Both have the same range; `ratio` is that side's to the other's. */
+static void follow(const char *name, int value, const int ratio[2], int *other, struct problem *problem)
+{
+	const struct field_range *range = scene_field_find("output", name)->range;
+	const int low = (int)range->low, high = (int)range->high, step = ratio[0];
+	/* Within the range of both sides, and a multiple of what makes the other side whole. */
+	const int least = (low * (ratio[0] > ratio[1] ? ratio[0] : ratio[1]) + ratio[1] - 1) / ratio[1];
+	const int most = high * (ratio[0] < ratio[1] ? ratio[0] : ratio[1]) / ratio[1];
+	char pointer[64];
+	snprintf(pointer, sizeof pointer, "/output/%s", name);
+	if (value % step != 0)
+		problem_add(problem, pointer, "must be a multiple of %d: this projection is %d to %d", step, ratio[0], ratio[1]);
+	else if (value < least || value > most)
+		problem_add(problem, pointer, "must be from %d to %d: this projection is %d to %d", least, most - most % step, ratio[0],
+			    ratio[1]);
+	else
+		*other = value / ratio[0] * ratio[1];
+}
+
+/* Panoramas have one shape: the side that was not given follows from the one that was. */
+static void resolve_size(struct scene_input *input, struct problem *problem)
+{
+	const struct scene_shape shape = scene_camera_shape(&input->scene.camera);
+	struct scene_output *output = &input->scene.output;
+	const bool width = given(input, "output", "width"), height = given(input, "output", "height");
+	const int upright[2] = {shape.ratio[1], shape.ratio[0]};
+	if (shape.ratio[0] == 0 || problem_mentions(problem, "/output/width") || problem_mentions(problem, "/output/height") ||
+	    problem_mentions(problem, "/camera/face"))
+		return;
+	int follows = 0;
+	if (width)
+		follow("width", output->width, shape.ratio, &follows, problem);
+	else if (height)
+		follow("height", output->height, upright, &follows, problem);
+	if (!width && !height)
+		output->width = shape.width, output->height = shape.height;
+	else if (!width)
+		output->width = follows ? follows : shape.width;
+	else if (!height)
+		output->height = follows ? follows : shape.height;
+	else if (follows && follows != output->height)
+		problem_add(problem, "/output/height", "must be %d for this width: this projection is %d to %d wide to high", follows,
+			    shape.ratio[0], shape.ratio[1]);
 }
 
 static void check_output(const struct scene_input *input, struct problem *problem)
@@ -132,5 +189,6 @@ void scene_rules_apply(struct scene_input *input, struct problem *problem)
 	check_clouds(input, problem);
 	check_ground(input, problem);
 	check_camera(input, problem);
+	resolve_size(input, problem);
 	check_output(input, problem);
 }

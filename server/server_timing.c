@@ -30,6 +30,12 @@ void timings_add_optics(struct timings *timings, double milliseconds, bool compu
 	timings->entry[TIMING_OPTICS].reused &= !computed;
 }
 
+void timings_add(struct timings *timings, enum timing timing, double milliseconds)
+{
+	timings->entry[timing].milliseconds += milliseconds;
+	timings->entry[timing].reused &= milliseconds <= 0;
+}
+
 void timings_format(const struct timings *timings, char text[static SERVER_TIMING_SIZE])
 {
 	size_t used = 0;

@@ -40,6 +40,9 @@ void timings_set_frame(struct timings *timings, const struct frame *frame);
 /* Adds what was spent on the optics before; `computed`: they did not come from memory. */
 void timings_add_optics(struct timings *timings, double milliseconds, bool computed);
 
+/* Adds what was spent before the renderer on what a stage begins with. */
+void timings_add(struct timings *timings, enum timing timing, double milliseconds);
+
 /* The header's value: what was measured, in the order above. */
 void timings_format(const struct timings *timings, char text[static SERVER_TIMING_SIZE]);
 

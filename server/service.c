@@ -17,7 +17,7 @@
 #define HANG_MS 300000.0
 
 /* Tracing photons takes what rendering and encoding leave. */
-enum { COMPUTER_COUNT = 2, COMPUTER_NICE = 5, TRACER_NICE = 10 };
+enum { COMPUTER_COUNT = 2, DECODER_NICE = 2, COMPUTER_NICE = 5, TRACER_NICE = 10 };
 
 static size_t worker_count(const struct config *config)
 {
@@ -66,6 +66,17 @@ static bool start_rendering(struct service *service)
 	return service->images != NULL;
 }
 
+static bool open_assets(struct service *service)
+{
+	const struct config *config = service->config;
+	const struct asset_limits limits = {.file_bytes = (uint64_t)config->asset_max_mb << 20,
+					    .total_bytes = (uint64_t)config->assets_disk_mb << 20,
+					    .count = (size_t)config->asset_count};
+	service->assets = asset_store_create(config->state_dir, &limits);
+	service->maps = asset_maps_create((size_t)config->assets_mb << 20);
+	return service->assets && service->maps;
+}
+
 struct service *service_create(const struct config *config)
 {
 	struct service *service = calloc(1, sizeof *service);
@@ -81,8 +92,9 @@ struct service *service_create(const struct config *config)
 	service->workers = worker_pool_create(workers, 2 * workers, 0);
 	service->computers = worker_pool_create(COMPUTER_COUNT, (size_t)config->queue_length, COMPUTER_NICE);
 	service->tracers = worker_pool_create(1, SERVICE_TRACINGS_MAX, TRACER_NICE);
-	const bool pools = service->workers && service->computers && service->tracers;
-	if (service->metrics && service->queue && pools && http_start(service) && start_rendering(service))
+	service->decoders = worker_pool_create(1, (size_t)config->queue_length, DECODER_NICE);
+	const bool pools = service->workers && service->computers && service->tracers && service->decoders;
+	if (pools && open_assets(service) && service->metrics && service->queue && http_start(service) && start_rendering(service))
 		return service;
 	service_destroy(service);
 	return NULL;
@@ -148,6 +160,9 @@ void service_destroy(struct service *service)
 	worker_pool_destroy(service->workers);
 	worker_pool_destroy(service->computers);
 	worker_pool_destroy(service->tracers);
+	worker_pool_destroy(service->decoders);
+	asset_maps_destroy(service->maps);
+	asset_store_destroy(service->assets);
 	render_queue_destroy(service->queue);
 	metrics_destroy(service->metrics);
 	free(service->pixel_version);

@@ -1,6 +1,7 @@
 #include "server/slab_query.h"
 
 #include "server/number_text.h"
+#include "server/query_list.h"
 #include "server/scene_canonical.h"
 #include "server/scene_rules.h"
 #include "server/text.h"
@@ -86,43 +87,22 @@ static struct slab_query query_default(void)
 static void read_number(const struct description *description, const char *value, const char *pointer, double *target,
 			struct problem *problem)
 {
-	char low[NUMBER_TEXT_SIZE], high[NUMBER_TEXT_SIZE];
+	char high[NUMBER_TEXT_SIZE];
 	double number;
-	number_format(description->low, low);
 	number_format(description->high, high);
-	if (!number_parse(value, &number))
-		problem_add(problem, pointer, "must be a number");
-	else if (description->type == TYPE_WHOLE && number != floor(number))
+	if (number_parse(value, &number) && description->type == TYPE_WHOLE && number != floor(number))
 		problem_add(problem, pointer, "must be a whole number");
-	else if (description->type == TYPE_POSITIVE && !(number > 0 && number <= description->high))
+	else if (number_parse(value, &number) && description->type == TYPE_POSITIVE && !(number > 0 && number <= description->high))
 		problem_add(problem, pointer, "must be above 0 and at most %s", high);
-	else if (!(number >= description->low && number <= description->high))
-		problem_add(problem, pointer, "must be from %s to %s", low, high);
 	else
-		*target = number;
+		query_number_read(value, description->low, description->high, pointer, target, problem);
 }
 
 static void read_list(const struct description *description, const char *value, struct slab_query *query, struct problem *problem)
 {
-	double *numbers = (double *)((char *)query + description->offset);
-	int *count = (int *)((char *)query + description->count_offset), given = 0;
-	char pointer[POINTER_SIZE] = "", *copy = strdup(value), *rest = copy;
-	pointer_append(pointer, sizeof pointer, description->name);
-	if (!copy)
-		problem_set(problem, PROBLEM_INTERNAL, "Out of memory.");
-	if (!*value)
-		problem_add(problem, pointer, "must be a list of at least one number");
-	for (char *element = *value ? strsep(&rest, ",") : NULL; element; element = strsep(&rest, ",")) {
-		if (given == description->count_max) {
-			problem_add(problem, pointer, "must be a list of at most %d numbers", description->count_max);
-			break;
-		}
-		char place[POINTER_SIZE + 16];
-		snprintf(place, sizeof place, "%s/%d", pointer, given);
-		read_number(description, element, place, &numbers[given++], problem);
-	}
-	*count = given;
-	free(copy);
+	const struct query_list list = {description->name, description->low, description->high, description->count_max};
+	query_list_read(&list, value, (double *)((char *)query + description->offset), (int *)((char *)query + description->count_offset),
+			problem);
 }
 
 static void read_choice(const struct description *description, const char *value, const char *pointer, int *target, struct problem *problem)

@@ -11,6 +11,7 @@ static const struct {
 	[TEXTURE_R32F] = {GL_R32F, GL_RED, 4},         [TEXTURE_RG32F] = {GL_RG32F, GL_RG, 8},
 	[TEXTURE_RGBA32F] = {GL_RGBA32F, GL_RGBA, 16}, [TEXTURE_RGBA16F] = {GL_RGBA16F, GL_RGBA, 8},
 	[TEXTURE_RGBA8] = {GL_RGBA8, GL_RGBA, 4},      [TEXTURE_RGBA16] = {GL_RGBA16, GL_RGBA, 8},
+	[TEXTURE_RG16] = {GL_RG16, GL_RG, 4},
 };
 
 static int level_count(int width, int height)
@@ -83,6 +84,12 @@ struct texture texture_level(const struct texture *texture, int level)
 	glTextureParameteri(view.id, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
 	glTextureParameteri(view.id, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
 	return view;
+}
+
+void texture_filter_linearly(struct texture *texture)
+{
+	glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+	glTextureParameteri(texture->id, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
 }
 
 size_t texture_bytes(const struct texture *texture)

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum texture_format { TEXTURE_R32F, TEXTURE_RG32F, TEXTURE_RGBA32F, TEXTURE_RGBA16F, TEXTURE_RGBA8, TEXTURE_RGBA16 };
+enum texture_format { TEXTURE_R32F, TEXTURE_RG32F, TEXTURE_RGBA32F, TEXTURE_RGBA16F, TEXTURE_RGBA8, TEXTURE_RGBA16, TEXTURE_RG16 };
 
 struct texture {
 	unsigned id; /* OpenGL name, 0 when there is none */
@@ -27,7 +27,7 @@ bool texture_init(struct texture *texture, int width, int height, enum texture_f
 /* The same with a third dimension, of one level, filtered linearly along all three and clamped to the edges. */
 bool texture_init_3d(struct texture *texture, int width, int height, int depth, enum texture_format format);
 
-/* Replaces level 0: rows of width x components floats, in three dimensions plane after plane. Not for TEXTURE_RGBA8/16. */
+/* Replaces level 0: rows of width x components floats, in three dimensions plane after plane. TEXTURE_RGBA8/16 take 0..1. */
 void texture_upload(const struct texture *texture, const float *values);
 
 /* Fills the other levels with box-filtered ones. */
@@ -36,6 +36,9 @@ void texture_build_mipmaps(const struct texture *texture);
 /* One level as a texture of its own, repeating and unfiltered, over the same memory: so that it can be read while another level is written.
  * The caller finishes it, before or after the whole. */
 struct texture texture_level(const struct texture *texture, int level);
+
+/* Filtered linearly from here on. */
+void texture_filter_linearly(struct texture *texture);
 
 /* Bytes of all levels. */
 size_t texture_bytes(const struct texture *texture);

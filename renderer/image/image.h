@@ -6,6 +6,7 @@
 #ifndef STRATUS_RENDERER_IMAGE_IMAGE_H
 #define STRATUS_RENDERER_IMAGE_IMAGE_H
 
+#include "renderer/image/picture_file.h"
 #include "renderer/renderer.h"
 
 #include <stdbool.h>
@@ -22,12 +23,26 @@ struct image_buffer {
 	size_t size;
 };
 
+/* Rows of a picture that is being read, from the top, each pixel grey, grey and alpha, RGB, or RGBA. Of a PNG codes over the largest code,
+ * colour not multiplied by alpha; of an EXR the numbers as they are. */
+struct image_rows {
+	int first, count;
+	int channels; /* 1..4 */
+	const float *values;
+};
+
+/* false stops the reading. */
+typedef bool image_rows_taker(void *context, const struct image_rows *rows);
+
 struct image_api {
 	const char *version; /* of this module and the libraries that decide about an image's bytes */
 	/* Encodes a frame as the scene's output asks (format, compression, type, bits). Any thread, several at once. false and a message in
 	 * `error` (at most error_size) on failure; buffer->data is then NULL. */
 	bool (*encode)(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata,
 		       struct image_buffer *buffer, char *error, size_t error_size);
+	/* Reads the picture that picture_file_read found in an open file. Nothing but the reader of its format runs. Any thread, several at
+	 * once. false and a message in `error` when the file is damaged or `take` stopped it. */
+	bool (*decode)(int fd, const struct picture_file *file, image_rows_taker *take, void *context, char *error, size_t error_size);
 };
 
 /* Loads the module: from `path`, or when NULL from stratus-image.so beside the running program or in ../lib/stratus. NULL and a log line on

@@ -1,6 +1,6 @@
-/* The module that writes image files through OpenImageIO; the only C++ of the tree (image.h tells why it is a module).
+/* The module that writes and reads image files through OpenImageIO; the only C++ of the tree (image.h tells why it is a module).
  *
- * Inside, failures are exceptions; encode() at the end is the one door to C and turns them into messages. Nothing varying enters
+ * Inside, failures are exceptions; encode() and decode() at the end are the doors to C and turn them into messages. Nothing varying enters
  * a file (no date, no host, no request id), so that the same frame and scene give the same bytes.
  */
 extern "C" {
@@ -10,6 +10,7 @@ extern "C" {
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/half.h>
 #include <OpenImageIO/imageio.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -29,6 +30,7 @@ extern "C" const struct image_api *stratus_image_api(void);
 namespace
 {
 
+using OIIO::ImageInput;
 using OIIO::ImageOutput;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
@@ -213,22 +215,45 @@ void camera_matrix(const struct scene_camera &camera, float matrix[16])
 	matrix[15] = 1;
 }
 
+/* From camera space on to EXR's normalized device coordinates, (0, 0) at the upper left corner of the picture and (1, 1) at the lower
+ * right one, as homogeneous coordinates over the depth. width, height: of the picture at distance 1. */
+void device_matrix(const float camera[16], double width, double height, float matrix[16])
+{
+	for (int row = 0; row < 4; row++) {
+		const double x = camera[row * 4], y = camera[row * 4 + 1], depth = camera[row * 4 + 2];
+		matrix[row * 4] = static_cast<float>(x / width + 0.5 * depth);
+		matrix[row * 4 + 1] = static_cast<float>(0.5 * depth - y / height);
+		matrix[row * 4 + 2] = matrix[row * 4 + 3] = static_cast<float>(depth);
+	}
+}
+
+/* height: of the picture at distance 1 */
+void describe_perspective(ImageSpec &spec, const struct scene_camera &camera, double height)
+{
+	float to_camera[16], to_device[16];
+	const double width = height * spec.width / spec.height;
+	camera_matrix(camera, to_camera);
+	device_matrix(to_camera, width, height, to_device);
+	spec.attribute("worldtocamera", OIIO::TypeMatrix44, to_camera);
+	spec.attribute("worldToNDC", OIIO::TypeMatrix44, to_device);
+	spec.attribute("screenWindowWidth", static_cast<float>(width));
+}
+
 void describe_projection(ImageSpec &spec, const struct scene &scene)
 {
 	switch (scene.camera.projection) {
-	case PROJECTION_PERSPECTIVE: {
-		float matrix[16];
-		camera_matrix(scene.camera, matrix);
-		spec.attribute("worldtocamera", OIIO::TypeMatrix44, matrix);
-		const double height = 2 * std::tan(scene.camera.vertical_fov_deg * M_PI / 360);
-		spec.attribute("screenWindowWidth", static_cast<float>(height * spec.width / spec.height));
+	case PROJECTION_PERSPECTIVE:
+		describe_perspective(spec, scene.camera, 2 * std::tan(scene.camera.vertical_fov_deg * M_PI / 360));
 		break;
-	}
 	case PROJECTION_EQUIRECTANGULAR:
 		spec.attribute("textureformat", "LatLong Environment");
 		spec.attribute("openexr:levelmode", 0); /* one level: scan lines, no pyramid */
 		break;
 	case PROJECTION_CUBEMAP:
+		if (scene.camera.face != FACE_ALL) {
+			describe_perspective(spec, scene.camera, 2);
+			break;
+		}
 		spec.attribute("textureformat", "CubeFace Environment");
 		spec.attribute("openexr:levelmode", 0);
 		break;
@@ -328,7 +353,134 @@ bytes encode_exr(const struct frame &frame, const struct scene &scene, const str
 	return std::move(proxy.buffer());
 }
 
-/* --- the door to C -------------------------------------------------------------------------------------------------------- */
+/* --- reading --------------------------------------------------------------------------------------------------------------- */
+
+/* The pieces of a file that its reader is to see, as one. */
+class picture_source : public OIIO::Filesystem::IOProxy
+{
+      public:
+	picture_source(int fd, const struct picture_file &file) : IOProxy("picture", Read), fd(fd), file(file)
+	{
+		for (size_t i = 0; i < file.piece_count; i++) {
+			starts.push_back(total);
+			total += file.pieces[i].size;
+		}
+	}
+
+	const char *proxytype() const override
+	{
+		return "picture";
+	}
+
+	size_t size() const override
+	{
+		return total;
+	}
+
+	size_t read(void *buffer, size_t count) override
+	{
+		const size_t got = pread(buffer, count, m_pos);
+		m_pos += static_cast<int64_t>(got);
+		return got;
+	}
+
+	size_t pread(void *buffer, size_t count, int64_t offset) override
+	{
+		size_t got = 0;
+		while (got < count && offset >= 0 && static_cast<uint64_t>(offset) + got < total) {
+			const size_t more = read_piece(static_cast<char *>(buffer) + got, count - got, static_cast<uint64_t>(offset) + got);
+			if (more == 0)
+				break;
+			got += more;
+		}
+		return got;
+	}
+
+      private:
+	/* Reads no further than the piece reaches that holds the place. */
+	size_t read_piece(char *buffer, size_t count, uint64_t place)
+	{
+		const size_t i = static_cast<size_t>(std::upper_bound(starts.begin(), starts.end(), place) - starts.begin()) - 1;
+		const uint64_t inside = place - starts[i];
+		const size_t wanted = static_cast<size_t>(std::min<uint64_t>(count, file.pieces[i].size - inside));
+		const ssize_t got = ::pread(fd, buffer, wanted, static_cast<off_t>(file.pieces[i].offset + inside));
+		return got > 0 ? static_cast<size_t>(got) : 0;
+	}
+
+	int fd;
+	const struct picture_file &file;
+	std::vector<uint64_t> starts; /* of the pieces, as the reader counts */
+	uint64_t total = 0;
+};
+
+/* The channels that make the picture: R, G, B (and A), or Y (and A), or the only one. OpenImageIO puts these first, in this order. */
+struct channel_range {
+	int first, count;
+};
+
+channel_range choose_input_channels(const ImageSpec &spec)
+{
+	const auto index = [&](const char *name) {
+		const auto found = std::find(spec.channelnames.begin(), spec.channelnames.end(), name);
+		return found == spec.channelnames.end() ? -1 : static_cast<int>(found - spec.channelnames.begin());
+	};
+	const int r = index("R"), y = index("Y"), a = index("A");
+	if (r >= 0 && index("G") == r + 1 && index("B") == r + 2)
+		return {r, a == r + 3 ? 4 : 3};
+	if (y >= 0 && r < 0 && index("RY") < 0)
+		return {y, a == y + 1 ? 2 : 1};
+	require(spec.nchannels == 1, "it has neither channels R, G, B nor one Y, nor one channel alone");
+	return {0, 1};
+}
+
+std::unique_ptr<ImageInput> open_input(enum image_format format, OIIO::Filesystem::IOProxy *proxy, ImageSpec &spec)
+{
+	const char *name = scene_format_names[format];
+	/* By its name: the readers of other formats are not even asked. */
+	auto in = ImageInput::create(name);
+	if (!in)
+		throw std::runtime_error(OIIO::geterror());
+	ImageSpec config;
+	config.attribute("oiio:UnassociatedAlpha", 1);
+	in->threads(1);
+	in->set_ioproxy(proxy);
+	if (!in->open(std::string("picture.") + name, spec, config))
+		throw std::runtime_error(in->geterror());
+	return in;
+}
+
+void read_rows(ImageInput &in, const ImageSpec &spec, channel_range channels, int y, int y_end, float *values)
+{
+	const int first = spec.y + y, end = spec.y + y_end, c = channels.first, c_end = c + channels.count;
+	const bool done = spec.tile_height > 0
+				  ? in.read_tiles(0, 0, spec.x, spec.x + spec.width, first, end, 0, 1, c, c_end, TypeDesc::FLOAT, values)
+				  : in.read_scanlines(0, 0, first, end, 0, c, c_end, TypeDesc::FLOAT, values);
+	if (!done)
+		throw std::runtime_error(in.geterror());
+}
+
+void decode_picture(int fd, const struct picture_file &file, image_rows_taker *take, void *context)
+{
+	picture_source source(fd, file);
+	ImageSpec spec;
+	auto in = open_input(file.format, &source, spec);
+	require(spec.width == file.width && spec.height == file.height && spec.depth == 1, "its size is not what its header says");
+	const channel_range channels = file.format == IMAGE_PNG ? channel_range{0, spec.nchannels} : choose_input_channels(spec);
+	require(channels.count >= 1 && channels.count <= 4, "it has more than four channels");
+	/* The reader of PNG holds what lies together by itself. */
+	const int block = spec.tile_height > 0 ? spec.tile_height : file.format == IMAGE_EXR ? file.row_block : 1;
+	constexpr int rows_at_least = 16;
+	const int step = std::min((rows_at_least + block - 1) / block * block, file.height);
+	std::vector<float> values(static_cast<size_t>(step) * file.width * channels.count);
+	for (int y = 0; y < file.height; y += step) {
+		const int y_end = std::min(y + step, file.height);
+		read_rows(*in, spec, channels, y, y_end, values.data());
+		const struct image_rows rows = {y, y_end - y, channels.count, values.data()};
+		require(take(context, &rows), "it was not taken");
+	}
+}
+
+/* --- the doors to C ------------------------------------------------------------------------------------------------------- */
 
 void check_frame(const struct frame &frame)
 {
@@ -360,7 +512,20 @@ bool encode(const struct frame *frame, const struct scene *scene, const struct i
 	return false;
 }
 
-const struct image_api api = {"OpenImageIO " OIIO_VERSION_STRING ", zlib " ZLIB_VERSION, encode};
+bool decode(int fd, const struct picture_file *file, image_rows_taker *take, void *context, char *error, size_t error_size) noexcept
+{
+	try {
+		decode_picture(fd, *file, take, context);
+		return true;
+	} catch (const std::exception &failure) {
+		std::snprintf(error, error_size, "%s", failure.what());
+	} catch (...) {
+		std::snprintf(error, error_size, "unknown failure of the image library");
+	}
+	return false;
+}
+
+const struct image_api api = {"OpenImageIO " OIIO_VERSION_STRING ", zlib " ZLIB_VERSION, encode, decode};
 
 } // namespace
 

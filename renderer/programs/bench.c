@@ -38,6 +38,8 @@ static const struct setting settings[] = {
 	NUMBER("clouds.base_m", clouds.base_m),
 	NUMBER("clouds.thickness_m", clouds.thickness_m),
 	NUMBER("clouds.tile_m", clouds.tile_m),
+	NUMBER("clouds.wind_mps.0", clouds.wind_mps[0]),
+	NUMBER("clouds.wind_mps.1", clouds.wind_mps[1]),
 	WORD("ground.type", ground.type, scene_ground_type_names),
 	NUMBER("ground.albedo.0", ground.albedo[0]),
 	NUMBER("ground.albedo.1", ground.albedo[1]),
@@ -51,6 +53,8 @@ static const struct setting settings[] = {
 	NUMBER("camera.elevation_deg", camera.elevation_deg),
 	NUMBER("camera.roll_deg", camera.roll_deg),
 	NUMBER("camera.vertical_fov_deg", camera.vertical_fov_deg),
+	WORD("camera.projection", camera.projection, scene_projection_names),
+	WORD("camera.face", camera.face, scene_face_names),
 	NUMBER("radiosity.tolerance", radiosity.tolerance),
 	WORD("model.shading", model.shading, scene_shading_names),
 	WORD("model.optics", model.optics, scene_optics_names),
@@ -60,7 +64,7 @@ static void usage(FILE *to)
 {
 	fprintf(to, "usage: render-bench [-k KERNEL] [-s SHADER_DIR] [-p auto|fragment|compute] [-d DEVICE] [-n FRAMES] [-w WIDTH] [-h "
 		    "HEIGHT]\n"
-		    "                    [-S SEED] [-R] [-o FILE.ppm|FILE.pfm] [NAME=VALUE ...]\n"
+		    "                    [-S SEED] [-r RESOLUTION] [-R] [-o FILE.ppm|FILE.pfm] [NAME=VALUE ...]\n"
 		    "Renders the default scene with these changes and prints milliseconds per stage of the first frame, of a repeated one "
 		    "with the\n"
 		    "camera turned, and of one with another time. -R switches the radiosity off. NAME is a member as in JSON (camera.z_m "
@@ -120,10 +124,12 @@ static void print_timing(const char *name, const struct frame *frame, double wal
 	printf("%-16s", name);
 	for (int i = 0; i < STAGE_COUNT; i++)
 		printf(" %s %.2f%s", stage_names[i], frame->timing[i].milliseconds, frame->timing[i].reused ? "*" : "");
-	printf(" wall %.2f ms, processor %.2f ms (passes %d, residual %.1e, EV %.2f", wall, processor, frame->radiosity_passes,
-	       frame->radiosity_residual, frame->exposure_ev);
+	printf(" wall %.2f ms, processor %.2f ms (EV %.2f", wall, processor, frame->exposure_ev);
 	if (frame->type == PIXEL_F32)
 		printf(", %.0f + %.0f lux", frame->direct_illuminance_lux, frame->diffuse_illuminance_lux);
+	printf("; residual after each of %d passes:", frame->radiosity_passes);
+	for (int i = 0; i < frame->radiosity_passes && i < RADIOSITY_PASSES_LISTED; i++)
+		printf(" %.1e", frame->radiosity_residuals[i]);
 	puts(")");
 }
 
@@ -144,8 +150,8 @@ int main(int argc, char **argv)
 	const char *kernel_path = "build/mie.kernel", *output = NULL;
 	struct renderer_params params = {.device_index = -1};
 	struct scene scene = scene_default();
-	int frames = 3, option, status = 1;
-	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:Ro:")) != -1) {
+	int frames = 3, width = 0, height = 0, option, status = 1;
+	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:r:Ro:")) != -1) {
 		switch (option) {
 		case 'k':
 			kernel_path = optarg;
@@ -163,13 +169,16 @@ int main(int argc, char **argv)
 			frames = atoi(optarg);
 			break;
 		case 'w':
-			scene.output.width = atoi(optarg);
+			width = atoi(optarg);
 			break;
 		case 'h':
-			scene.output.height = atoi(optarg);
+			height = atoi(optarg);
 			break;
 		case 'S':
 			scene.clouds.seed = (uint32_t)strtoul(optarg, NULL, 10);
+			break;
+		case 'r':
+			scene.clouds.resolution = atoi(optarg);
 			break;
 		case 'R':
 			scene.radiosity.enabled = false;
@@ -191,6 +200,10 @@ int main(int argc, char **argv)
 			return 2;
 		}
 	}
+
+	const struct scene_shape shape = scene_camera_shape(&scene.camera);
+	scene.output.width = width ? width : shape.ratio[0] && height ? height * shape.ratio[0] / shape.ratio[1] : shape.width;
+	scene.output.height = height ? height : shape.ratio[0] ? scene.output.width * shape.ratio[1] / shape.ratio[0] : shape.height;
 
 	const double begin = clock_milliseconds();
 	struct kernel *kernel = kernel_load(kernel_path);

@@ -17,9 +17,9 @@ static double lobe(double nm, double centre, double below, double above)
 	return exp(-0.5 * t * t);
 }
 
-/* CIE 1931 2 degree observer: multi-lobe fit of Wyman, Sloan, Shirley 2013 ("Simple Analytic Approximations to the CIE XYZ Color Matching
+/* Multi-lobe fit of Wyman, Sloan, Shirley 2013 ("Simple Analytic Approximations to the CIE XYZ Color Matching
  * Functions", JCGT 2(2), table 1), within 1 % of the tables. */
-static void observer(double nm, double xyz[3])
+void colour_observer(double nm, double xyz[3])
 {
 	xyz[0] =
 		1.056 * lobe(nm, 599.8, 0.0264, 0.0323) + 0.362 * lobe(nm, 442.0, 0.0624, 0.0374) - 0.065 * lobe(nm, 501.1, 0.0490, 0.0382);
@@ -39,7 +39,7 @@ static void band_xyz(double xyz[3][3])
 		const double x = (nm - 450) / 100;
 		const double weight[3] = {x * (x - 1) / 2, x * (2 - x), (x - 1) * (x - 2) / 2};
 		double cmf[3];
-		observer(nm, cmf);
+		colour_observer(nm, cmf);
 		for (int c = 0; c < 3; c++)
 			for (int b = 0; b < 3; b++)
 				xyz[c][b] += 683.0 * cmf[c] * SPECTRUM_STEP_NM * solar_spectrum[i] * weight[b] / colour_solar_irradiance[b];

@@ -8,6 +8,9 @@ extern const double colour_solar_irradiance[3];
 /* Luminance in cd/m2 that linear Rec.709 (1, 1, 1) stands for. */
 #define COLOUR_WHITE_LUMINANCE 1000.0
 
+/* CIE 1931 2 degree observer at a wavelength in nm: x, y, z. */
+void colour_observer(double nm, double xyz[3]);
+
 /* matrix[channel][band]: linear Rec.709 (D65, colorimetric) of spectral radiance 1 W/m2/nm/sr in one band. What the spectrum does between
  * the bands is the solar spectrum times the parabola through the three ratios to it, integrated with the CIE 1931 observer. */
 void colour_band_matrix(double matrix[3][3]);

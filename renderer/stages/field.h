@@ -2,30 +2,38 @@
  *
  * Depends on the cloud's type, seed, time, coverage, tile, resolution and wind. The field is kept before its threshold
  * (shaders/lib/field.glsl); coverage becomes the quantile of it where cloud begins. Beside it stands the thickness after the threshold,
- * evened out over the block's slab_light; for views from above the thickness itself with a pyramid of maxima.
+ * as it is and evened out over the block's slab_light; for views from above a finer one with a pyramid of maxima, and the sun on it.
  */
 #ifndef STRATUS_RENDERER_STAGES_FIELD_H
 #define STRATUS_RENDERER_STAGES_FIELD_H
 
-#include "renderer/stages/stage.h"
+#include "renderer/stages/field_noise.h"
+#include "renderer/stages/height_light.h"
+#include "renderer/stages/packed.h"
 
-enum { FIELD_PASS_COUNT = 6 };
+enum { FIELD_PASS_COUNT = 4 };
 
 struct field_stage {
 	struct pass *passes[FIELD_PASS_COUNT];
+	struct field_noise noise;
+	struct height_light_stage light;
+	struct pass *pack;
 	unsigned histogram; /* OpenGL buffer */
 };
 
 struct field_maps {
-	const struct texture *coarse, *detail;  /* density before the threshold, and its detail */
-	const struct texture *smooth;           /* thickness over the tile, m, evened out */
-	const struct texture *height, *maximum; /* thickness itself and its maxima; NULL unless asked for */
+	const struct texture *coarse, *detail; /* density before the threshold, and its detail */
+	const struct texture *thickness;       /* over the tile, m, in the frame of the drifting clouds, 256 texels a side */
+	const struct texture *smooth;          /* the same evened out */
+	const struct texture *height, *light;  /* finer thickness with its maxima, and the sun on it; NULL unless asked for */
+	/* Packed, for views from below; coarse and detail NULL at resolutions where that would be too much memory. */
+	const struct texture *coarse_packed, *detail_packed, *smooth_packed;
 };
 
 bool field_stage_init(struct field_stage *stage, const struct pass_compiler *compiler);
 void field_stage_finish(struct field_stage *stage);
 
-/* Fills in the block's cloud members. Wants slab_slices_get to have run. from_above: height and maximum are wanted. Maps stay valid for
+/* Fills in the block's cloud members. Wants slab_slices_get to have run. from_above: height and light are wanted. Maps stay valid for
  * this frame; without clouds they are all NULL. false (and a log line) when out of memory. */
 bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, bool from_above,
 		     struct field_maps *maps);

@@ -6,22 +6,21 @@
 
 #include "renderer/stages/stage.h"
 
-enum { GROUND_PASS_COUNT = 2 };
-
 struct ground_stage {
-	struct pass *passes[GROUND_PASS_COUNT];
+	struct pass_compiler compiler;         /* shader_dir must outlive the stage */
+	struct pass *paint[GROUND_TYPE_COUNT]; /* made with the first picture of a type */
 };
 
 struct ground_maps {
-	const struct texture *map;    /* reflectance per band (650, 550, 450 nm), 0..1 */
-	const struct texture *relief; /* noise, within -2..2, for what lies close by */
-	double mean[3];               /* of the map */
+	const struct texture *map; /* reflectance per band (650, 550, 450 nm), 0..1 */
+	double mean[3];            /* of the map */
 };
 
-bool ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler);
+void ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler);
 void ground_stage_finish(struct ground_stage *stage);
 
-/* Fills in the block's ground members. Maps stay valid for this frame. false (and a log line) when out of memory. */
-bool ground_stage_run(const struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps);
+/* Fills in the block's ground members. Maps stay valid for this frame. false (and a log line) when out of memory or when a program does not
+ * compile. */
+bool ground_stage_run(struct ground_stage *stage, struct stage_context *context, const struct scene *scene, struct ground_maps *maps);
 
 #endif

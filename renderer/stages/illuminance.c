@@ -16,7 +16,7 @@ void illuminance_stage_init(struct illuminance_stage *stage, const struct pass_c
 
 void illuminance_stage_finish(struct illuminance_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	*stage = (struct illuminance_stage){0};
@@ -24,7 +24,7 @@ void illuminance_stage_finish(struct illuminance_stage *stage)
 
 static const struct pass *pass_of(struct illuminance_stage *stage, const struct view_variant *variant)
 {
-	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight];
+	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->packed];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/illuminance.glsl", 1, variant);
 	return *pass;
@@ -82,7 +82,8 @@ bool illuminance_stage_run(struct illuminance_stage *stage, struct stage_context
 		*illuminance = *known;
 		return true;
 	}
-	const struct view_variant variant = view_variant_of(context, scene, inputs, false);
+	struct view_variant variant = view_variant_of(context, scene, inputs, false);
+	variant.ground = VIEW_BARE; /* none is looked at */
 	const struct pass *pass = pass_of(stage, &variant);
 	struct illuminance *kept = pass ? malloc(sizeof *kept) : NULL;
 	if (!kept || !compute(pass, context, &variant, inputs, illuminance)) {

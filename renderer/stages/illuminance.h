@@ -10,7 +10,8 @@
 
 struct illuminance_stage {
 	struct pass_compiler compiler;
-	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2]; /* by shading, side, twilight; made with the first frame that wants them */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2]
+			   [2]; /* by shading, side, twilight, packed; made with the first frame that wants them */
 };
 
 struct illuminance {

@@ -7,29 +7,51 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PASS_TRANSMITTANCE, PASS_MULTISCATTER, PASS_VIEW, PASS_RAYS };
+enum { PASS_TRANSMITTANCE, PASS_MULTISCATTER, PASS_MULTISCATTER_AGAIN, PASS_GROUND, PASS_VIEW, PASS_IRRADIANCE, PASS_RAYS };
+
+#define AIR_SAMPLERS                                                                                                                       \
+	"transmittance_table", "diffuse_0", "diffuse_1", "diffuse_2", "diffuse_3", "diffuse_4", "diffuse_5", "diffuse_6", "diffuse_7"
+enum { MOMENT_COUNT = 8 };
 
 static const struct pass_desc pass_descs[SKY_PASS_COUNT] = {
 	[PASS_TRANSMITTANCE] = {.file = "shaders/passes/transmittance.glsl", .outputs = 1},
-	[PASS_MULTISCATTER] = {.file = "shaders/passes/multiscatter.glsl", .outputs = 1, .samplers = {"transmittance_table"}},
-	[PASS_VIEW] = {.file = "shaders/passes/sky_view.glsl", .outputs = 4, .samplers = {"transmittance_table", "multiscatter_table"}},
-	[PASS_RAYS] = {.file = "shaders/passes/sky_irradiance_rays.glsl",
-		       .outputs = 1,
-		       .samplers = {"transmittance_table", "multiscatter_table"}},
+	[PASS_MULTISCATTER] = {.file = "shaders/passes/multiscatter.glsl",
+			       .defines = "#define MULTISCATTER_AGAIN 0\n#define MULTISCATTER_GROUND 0\n",
+			       .outputs = MOMENT_COUNT,
+			       .samplers = {"transmittance_table"}},
+	[PASS_MULTISCATTER_AGAIN] = {.file = "shaders/passes/multiscatter.glsl",
+				     .defines = "#define MULTISCATTER_AGAIN 1\n#define MULTISCATTER_GROUND 0\n",
+				     .outputs = MOMENT_COUNT,
+				     .samplers = {AIR_SAMPLERS, "ground_irradiance"}},
+	[PASS_GROUND] = {.file = "shaders/passes/multiscatter.glsl",
+			 .defines = "#define MULTISCATTER_AGAIN 1\n#define MULTISCATTER_GROUND 1\n",
+			 .outputs = 1,
+			 .samplers = {AIR_SAMPLERS}},
+	[PASS_VIEW] = {.file = "shaders/passes/sky_view.glsl", .outputs = 4, .samplers = {AIR_SAMPLERS}},
+	[PASS_IRRADIANCE] = {.file = "shaders/passes/sky_irradiance_rays.glsl", .outputs = 1, .samplers = {AIR_SAMPLERS}},
+	[PASS_RAYS] = {.file = "shaders/passes/sky_rays.glsl", .outputs = 1, .samplers = {AIR_SAMPLERS, "ray_table"}},
 };
 
-/* Sizes as in shaders/lib/atmosphere.glsl, sky_table.glsl and passes/sky_irradiance_rays.glsl. */
-enum { TRANSMITTANCE_W = 256, TRANSMITTANCE_H = 64, MULTISCATTER_SIDE = 32, VIEW_W = 96, VIEW_H = 160, RAYS_SIDE = 16 };
+/* Sizes as in shaders/lib/atmosphere.glsl, multiscatter.glsl, sky_table.glsl and passes/sky_irradiance_rays.glsl. */
+enum { TRANSMITTANCE_W = 256, TRANSMITTANCE_H = 64, MULTISCATTER_W = 40, MULTISCATTER_H = 16, VIEW_W = 96, VIEW_H = 160, RAYS_SIDE = 16 };
 
-/* Rayleigh optical thickness of the whole air at 650, 550, 450 nm (Bodhaine et al. 1999, sea level), scale height 8 km. */
+/* Pairs of orders of scattering that are added to the closed series. */
+enum { GATHERINGS = 1 };
+
+/* Rayleigh optical thickness of the whole air at 650, 550, 450 nm (Bodhaine et al. 1999, sea level). Scale heights below and above 10 km
+ * keep within 15 % of the density of the US Standard Atmosphere 1976 up to 50 km; the one of 8 km that is often taken has twice the air at
+ * 40 to 50 km, and twice the light of civil twilight. */
 static const double rayleigh_thickness[3] = {0.04714702, 0.09297450, 0.21150562};
-static const double rayleigh_scale_m = 8000;
+static const double rayleigh_scale_m = 9200, rayleigh_bend_m = 10000, rayleigh_scale_above_m = 6500;
 /* Aerosol as in the clear-sky comparison of Bruneton 2016 ("A Qualitative and Quantitative Evaluation of 8 Clear Sky Models"): optical
  * depth falling with wavelength^0.8, scale height 1.2 km, single scattering albedo 0.8, Cornette-Shanks asymmetry 0.7. */
 static const double aerosol_exponent = 0.8, aerosol_scale_m = 1200, aerosol_albedo = 0.8, aerosol_asymmetry = 0.7;
-/* Ozone absorption cross sections in m2 at the bands (Serdyuchenko et al. 2014, 223 K, means over 10 nm); 1 DU is 2.6867e20 molecules per
- * m2; tent from 10 to 40 km, whose integral is its half-width of 15 km. */
-static const double ozone_cross_section[3] = {2.4e-25, 3.3e-25, 1.7e-26};
+/* Ozone absorption cross sections in m2 (Serdyuchenko et al. 2014, 223 K, means over 10 nm). The bands' own wavelengths miss the peak of
+ * Chappuis' band at 600 nm, of which the red third of the spectrum has most: pictures take what gives sun, sky and twilight the colour and
+ * luminance that a spectrum of 10 nm steps gives them (docs/validation/sky.md), numbers at 650, 550 and 450 nm what holds there. */
+const double sky_ozone_of_pictures[3] = {4.4e-25, 3.3e-25, 3.5e-26};
+const double sky_ozone_at_wavelength[3] = {2.4e-25, 3.3e-25, 1.7e-26};
+/* 1 DU is 2.6867e20 molecules per m2; tent from 10 to 40 km, whose integral is its half-width of 15 km. */
 static const double ozone_peak_m = 25000, ozone_half_width_m = 15000, dobson_per_m2 = 2.6867e20;
 
 /* Angular radius of the sun, 0.533 degrees across. */
@@ -45,7 +67,14 @@ void sky_stage_finish(struct sky_stage *stage)
 	stage_destroy_passes(stage->passes, SKY_PASS_COUNT);
 }
 
-static void fill_block(struct scene_block *block, const struct scene *scene, const double mean_albedo[3])
+/* Length that the coefficient at the ground stands for. */
+static double rayleigh_column_m(void)
+{
+	const double left = exp(-rayleigh_bend_m / rayleigh_scale_m);
+	return rayleigh_scale_m * (1 - left) + rayleigh_scale_above_m * left;
+}
+
+static void fill_block(struct scene_block *block, const struct scene *scene, const double mean_albedo[3], const double ozone[3])
 {
 	const double elevation = scene->sun.elevation_deg * M_PI / 180, azimuth = scene->sun.azimuth_deg * M_PI / 180;
 	block->sun_direction[0] = (float)(cos(elevation) * sin(azimuth));
@@ -55,10 +84,10 @@ static void fill_block(struct scene_block *block, const struct scene *scene, con
 	for (int band = 0; band < 3; band++) {
 		const double wavelength_um = (650 - 100 * band) * 1e-3;
 		block->solar_irradiance[band] = (float)colour_solar_irradiance[band];
-		block->rayleigh[band] = (float)(rayleigh_thickness[band] / rayleigh_scale_m);
+		block->rayleigh[band] = (float)(rayleigh_thickness[band] / rayleigh_column_m());
 		block->aerosol[band] =
 			(float)(scene->atmosphere.aerosol_optical_depth * pow(wavelength_um / 0.55, -aerosol_exponent) / aerosol_scale_m);
-		block->ozone[band] = (float)(scene->atmosphere.ozone_du * dobson_per_m2 * ozone_cross_section[band] / ozone_half_width_m);
+		block->ozone[band] = (float)(scene->atmosphere.ozone_du * dobson_per_m2 * ozone[band] / ozone_half_width_m);
 		block->ground_mean_albedo[band] = (float)mean_albedo[band];
 	}
 	block->rayleigh[3] = (float)rayleigh_scale_m;
@@ -71,15 +100,74 @@ static void fill_block(struct scene_block *block, const struct scene *scene, con
 /* --- results -------------------------------------------------------------------------------------------------------------------- */
 
 struct air_tables {
-	struct texture transmittance, multiscatter;
+	struct texture transmittance, moments[MOMENT_COUNT]; /* shaders/lib/multiscatter.glsl */
 };
+
+static void moments_finish(struct texture moments[MOMENT_COUNT])
+{
+	for (int i = 0; i < MOMENT_COUNT; i++)
+		texture_finish(&moments[i]);
+}
+
+static bool moments_init(struct texture moments[MOMENT_COUNT])
+{
+	for (int i = 0; i < MOMENT_COUNT; i++)
+		if (!texture_init(&moments[i], MULTISCATTER_W, MULTISCATTER_H, TEXTURE_RGBA32F, 0))
+			return false;
+	return true;
+}
 
 static void air_tables_destroy(void *value)
 {
 	struct air_tables *air = value;
-	texture_finish(&air->multiscatter);
+	moments_finish(air->moments);
 	texture_finish(&air->transmittance);
 	free(air);
+}
+
+/* In the order of AIR_SAMPLERS. */
+static struct pass_run run_with_air(const struct texture *transmittance, const struct texture moments[MOMENT_COUNT])
+{
+	struct pass_run run = {.samplers = {transmittance}};
+	for (int i = 0; i < MOMENT_COUNT; i++)
+		run.samplers[1 + i] = &moments[i];
+	return run;
+}
+
+static void gather(const struct pass *pass, struct pass_run run, struct texture moments[MOMENT_COUNT])
+{
+	struct texture *targets[MOMENT_COUNT];
+	for (int i = 0; i < MOMENT_COUNT; i++)
+		targets[i] = &moments[i];
+	run.targets = targets;
+	pass_run(pass, &run);
+}
+
+/* Adds an order of scattering: `from` to `to`, by way of the light on the ground. */
+static void gather_again(const struct sky_stage *stage, const struct texture *transmittance, struct texture *ground,
+			 const struct texture from[MOMENT_COUNT], struct texture to[MOMENT_COUNT])
+{
+	struct pass_run run = run_with_air(transmittance, from);
+	run.targets = &ground;
+	pass_run(stage->passes[PASS_GROUND], &run);
+	run.samplers[1 + MOMENT_COUNT] = ground;
+	gather(stage->passes[PASS_MULTISCATTER_AGAIN], run, to);
+}
+
+static bool compute_moments(const struct sky_stage *stage, struct air_tables *air)
+{
+	struct texture before[MOMENT_COUNT] = {{0}}, ground = {0};
+	const bool ok = moments_init(air->moments) && moments_init(before) && texture_init(&ground, MULTISCATTER_W, 1, TEXTURE_RGBA32F, 0);
+	if (ok) {
+		gather(stage->passes[PASS_MULTISCATTER], (struct pass_run){.samplers = {&air->transmittance}}, air->moments);
+		for (int i = 0; i < GATHERINGS; i++) {
+			gather_again(stage, &air->transmittance, &ground, air->moments, before);
+			gather_again(stage, &air->transmittance, &ground, before, air->moments);
+		}
+	}
+	texture_finish(&ground);
+	moments_finish(before);
+	return ok;
 }
 
 static struct air_tables *air_tables_compute(const struct sky_stage *stage)
@@ -87,14 +175,15 @@ static struct air_tables *air_tables_compute(const struct sky_stage *stage)
 	struct air_tables *air = calloc(1, sizeof *air);
 	if (!air)
 		return NULL;
-	if (!texture_init(&air->transmittance, TRANSMITTANCE_W, TRANSMITTANCE_H, TEXTURE_RGBA32F, 0) ||
-	    !texture_init(&air->multiscatter, MULTISCATTER_SIDE, MULTISCATTER_SIDE, TEXTURE_RGBA32F, 0)) {
+	if (!texture_init(&air->transmittance, TRANSMITTANCE_W, TRANSMITTANCE_H, TEXTURE_RGBA32F, 0)) {
 		air_tables_destroy(air);
 		return NULL;
 	}
 	pass_run(stage->passes[PASS_TRANSMITTANCE], &(struct pass_run){.targets = (struct texture *[]){&air->transmittance}});
-	pass_run(stage->passes[PASS_MULTISCATTER],
-		 &(struct pass_run){.targets = (struct texture *[]){&air->multiscatter}, .samplers = {&air->transmittance}});
+	if (!compute_moments(stage, air)) {
+		air_tables_destroy(air);
+		return NULL;
+	}
 	return air;
 }
 
@@ -103,16 +192,18 @@ static const struct air_tables *air_tables_get(const struct sky_stage *stage, st
 {
 	struct cache_key key = cache_key_make("air");
 	cache_key_add(&key, scene->atmosphere.aerosol_optical_depth);
-	cache_key_add(&key, scene->atmosphere.ozone_du);
-	for (int band = 0; band < 3; band++)
+	/* Which cross sections: by the coefficients that came of them. */
+	for (int band = 0; band < 3; band++) {
+		cache_key_add(&key, context->block.ozone[band]);
 		cache_key_add(&key, mean_albedo[band]);
+	}
 	struct air_tables *air = cache_find(context->cache, &key);
 	if (air)
 		return air;
 	context->reused = false;
 	air = air_tables_compute(stage);
-	if (!air || !cache_keep(context->cache, &key, air, texture_bytes(&air->transmittance) + texture_bytes(&air->multiscatter),
-				air_tables_destroy))
+	if (!air || !cache_keep(context->cache, &key, air,
+				texture_bytes(&air->transmittance) + MOMENT_COUNT * texture_bytes(&air->moments[0]), air_tables_destroy))
 		return NULL;
 	return air;
 }
@@ -137,9 +228,10 @@ static bool diffuse_irradiance(const struct sky_stage *stage, const struct air_t
 	struct texture rays;
 	if (!texture_init(&rays, RAYS_SIDE, RAYS_SIDE, TEXTURE_RGBA32F, TEXTURE_NEAREST))
 		return false;
-	pass_run(stage->passes[PASS_RAYS], &(struct pass_run){.targets = (struct texture *[]){&rays},
-							      .samplers = {&air->transmittance, &air->multiscatter},
-							      .arguments = {{(float)height}}});
+	struct pass_run run = run_with_air(&air->transmittance, air->moments);
+	run.targets = (struct texture *[]){&rays};
+	run.arguments[0][0] = (float)height;
+	pass_run(stage->passes[PASS_IRRADIANCE], &run);
 	stage_read_texture(&rays, 0, 4, &texels[0][0]);
 	texture_finish(&rays);
 	for (int band = 0; band < 3; band++) {
@@ -163,10 +255,11 @@ static void sun_irradiance(const struct scene_block *block, double height, doubl
 	for (int i = 0; i < STEPS; i++) {
 		const double t = (i + 0.5) * end / STEPS, h = fmax(0, sqrt(r * r + 2 * r * cosine * t + t * t) - radius);
 		for (int band = 0; band < 3; band++)
-			depth[band] +=
-				end / STEPS *
-				(block->rayleigh[band] * exp(-h / rayleigh_scale_m) + block->aerosol[band] * exp(-h / aerosol_scale_m) +
-				 block->ozone[band] * fmax(0, 1 - fabs(h - ozone_peak_m) / ozone_half_width_m));
+			depth[band] += end / STEPS *
+				       (block->rayleigh[band] * exp(-fmin(h, rayleigh_bend_m) / rayleigh_scale_m -
+								    fmax(h - rayleigh_bend_m, 0) / rayleigh_scale_above_m) +
+					block->aerosol[band] * exp(-h / aerosol_scale_m) +
+					block->ozone[band] * fmax(0, 1 - fabs(h - ozone_peak_m) / ozone_half_width_m));
 	}
 	for (int band = 0; band < 3; band++)
 		irradiance[band] = visible * block->solar_irradiance[band] * exp(-depth[band]);
@@ -184,7 +277,9 @@ static struct sky_view *sky_view_compute(const struct sky_stage *stage, const st
 		if (!texture_init(targets[i], VIEW_W, VIEW_H, TEXTURE_RGBA32F, 0))
 			goto fail;
 	}
-	pass_run(stage->passes[PASS_VIEW], &(struct pass_run){.targets = targets, .samplers = {&air->transmittance, &air->multiscatter}});
+	struct pass_run run = run_with_air(&air->transmittance, air->moments);
+	run.targets = targets;
+	pass_run(stage->passes[PASS_VIEW], &run);
 	if (!diffuse_irradiance(stage, air, cloud_height, view->diffuse_cloud) || !diffuse_irradiance(stage, air, 0, view->diffuse_ground))
 		goto fail;
 	sun_irradiance(&context->block, cloud_height, view->sun_cloud);
@@ -228,7 +323,7 @@ static const struct sky_view *sky_view_get(const struct sky_stage *stage, struct
 bool sky_stage_run(const struct sky_stage *stage, struct stage_context *context, const struct scene *scene, const double mean_albedo[3],
 		   struct sky_tables *tables)
 {
-	fill_block(&context->block, scene, mean_albedo);
+	fill_block(&context->block, scene, mean_albedo, sky_ozone_of_pictures);
 	stage_upload_block(context);
 	const struct air_tables *air = air_tables_get(stage, context, scene, mean_albedo);
 	const struct sky_view *view = air ? sky_view_get(stage, context, scene, mean_albedo, air) : NULL;
@@ -249,6 +344,77 @@ bool sky_stage_run(const struct sky_stage *stage, struct stage_context *context,
 		context->block.sky_irradiance_cloud[band] = (float)view->diffuse_cloud[band];
 		context->block.sun_at_camera[band] = (float)view->sun_camera[band];
 		context->block.sky_irradiance_ground[band] = (float)view->diffuse_ground[band];
+	}
+	return true;
+}
+
+/* --- single directions ------------------------------------------------------------------------------------------------------------ */
+
+/* Rows over the zenith angles, columns over the azimuths. */
+static bool rays_init(struct texture *rays, const struct scene_block *block, const struct sky_directions *directions)
+{
+	const int columns = directions->azimuth_count, rows = directions->view_count;
+	float *texels = malloc((size_t)columns * (size_t)rows * 4 * sizeof *texels), *texel = texels;
+	if (!texels || !texture_init(rays, columns, rows, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
+		free(texels);
+		return false;
+	}
+	for (int row = 0; row < rows; row++)
+		for (int column = 0; column < columns; column++, texel += 4) {
+			const double zenith = directions->view_zenith_deg[row] * M_PI / 180;
+			const double azimuth = directions->azimuth_deg[column] * M_PI / 180;
+			const double mu = fmax(0, cos(zenith));
+			texel[0] = (float)mu;
+			texel[1] = (float)(sin(zenith) * (sin(azimuth) * block->sun_direction[0] + cos(azimuth) * block->sun_direction[1]) +
+					   mu * block->sun_direction[2]);
+			texel[2] = texel[3] = 0;
+		}
+	texture_upload(rays, texels);
+	free(texels);
+	return true;
+}
+
+static bool radiance_along(const struct sky_stage *stage, const struct stage_context *context, const struct air_tables *air,
+			   const struct sky_directions *directions, double *radiance)
+{
+	const int columns = directions->azimuth_count, rows = directions->view_count, count = columns * rows;
+	struct texture rays = {0}, seen = {0};
+	float *texels = malloc((size_t)count * 4 * sizeof *texels);
+	const bool ok = texels && rays_init(&rays, &context->block, directions) &&
+			texture_init(&seen, columns, rows, TEXTURE_RGBA32F, TEXTURE_NEAREST);
+	if (ok) {
+		struct pass_run run = run_with_air(&air->transmittance, air->moments);
+		run.targets = (struct texture *[]){&seen};
+		run.samplers[1 + MOMENT_COUNT] = &rays;
+		pass_run(stage->passes[PASS_RAYS], &run);
+		stage_read_texture(&seen, 0, 4, texels);
+		for (int band = 0; band < 3; band++)
+			for (int i = 0; i < count; i++)
+				radiance[band * count + i] = texels[4 * i + band] / colour_solar_irradiance[band];
+	}
+	texture_finish(&seen);
+	texture_finish(&rays);
+	free(texels);
+	return ok;
+}
+
+bool sky_stage_run_directions(const struct sky_stage *stage, struct stage_context *context, const struct scene *scene,
+			      const double mean_albedo[3], const struct sky_directions *directions, struct sky_light *light)
+{
+	double sun[3];
+	fill_block(&context->block, scene, mean_albedo, sky_ozone_at_wavelength);
+	stage_upload_block(context);
+	light->radiance = malloc((size_t)directions->view_count * (size_t)directions->azimuth_count * 3 * sizeof *light->radiance);
+	const struct air_tables *air = light->radiance ? air_tables_get(stage, context, scene, mean_albedo) : NULL;
+	if (!air || !diffuse_irradiance(stage, air, 0, light->diffuse_irradiance) ||
+	    !radiance_along(stage, context, air, directions, light->radiance)) {
+		log_error("sky: out of memory");
+		return false;
+	}
+	sun_irradiance(&context->block, 0, sun);
+	for (int band = 0; band < 3; band++) {
+		light->direct_transmittance[band] = sun[band] / colour_solar_irradiance[band];
+		light->diffuse_irradiance[band] /= colour_solar_irradiance[band];
 	}
 	return true;
 }

@@ -1,5 +1,7 @@
 #include "renderer/stages/stage.h"
 
+#include "renderer/scene_map.h"
+
 #include <epoxy/gl.h>
 
 void stage_upload_block(struct stage_context *context)
@@ -48,6 +50,14 @@ void stage_key_add_light(struct cache_key *key, const struct scene *scene)
 				 scene->model.optics};
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(key, inputs[i]);
+	stage_key_add_map(key, clouds->map.map);
+	stage_key_add_map(key, scene->ground.map.map);
+}
+
+void stage_key_add_map(struct cache_key *key, const struct scene_map *map)
+{
+	static const unsigned char none[SCENE_MAP_HASH_BYTES];
+	cache_key_add_bytes(key, map ? map->hash : none, SCENE_MAP_HASH_BYTES);
 }
 
 bool stage_create_passes(const struct pass_compiler *compiler, const struct pass_desc *descs, struct pass **passes, int count)

@@ -30,6 +30,9 @@ void stage_read_texture(const struct texture *texture, int level, int components
 /* Appends all of a scene that its light depends on: everything but camera and output. */
 void stage_key_add_light(struct cache_key *key, const struct scene *scene);
 
+/* Appends the content of a map; NULL counts too. */
+void stage_key_add_map(struct cache_key *key, const struct scene_map *map);
+
 /* Creates a list of passes; all or none. */
 bool stage_create_passes(const struct pass_compiler *compiler, const struct pass_desc *descs, struct pass **passes, int count);
 void stage_destroy_passes(struct pass **passes, int count);

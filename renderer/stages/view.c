@@ -9,35 +9,52 @@
 #include <string.h>
 
 /* OpenGL grants 16 samplers; each side leaves some out. */
-#define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "ground_relief"
-#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received", "smooth_table"
+#define COMMON_SAMPLERS "transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map"
+#define CLOUD_SAMPLERS  "phase_table", "event_table", "slab_table", "slab_slices", "ground_received", "cloud_received"
+
+/* A sea has no picture of its own, but one of the sky. */
+enum { GROUND_SAMPLER = 5 };
 
 static const struct {
 	const char *defines;
 	const char *samplers[PASS_SAMPLERS_MAX];
 } sides[VIEW_SIDES] = {
 	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
-	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS, CLOUD_SAMPLERS, "field_coarse", "field_detail"}},
+	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n",
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "smooth_table", "field_coarse", "field_detail"}},
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
-			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_table", "height_maximum"}},
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
-static const struct pass_desc develop_desc = {.file = "shaders/passes/develop.glsl", .outputs = 1, .samplers = {"picture"}};
+static const struct pass_desc develop_descs[2] = {
+	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 0\n", .outputs = 1, .samplers = {"picture"}},
+	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 1\n", .outputs = 1, .samplers = {"picture"}},
+};
+
+/* Of what lies close by (shaders/lib/ground.glsl). */
+static const enum view_ground grounds[GROUND_TYPE_COUNT] = {
+	[GROUND_GRASS] = VIEW_GROWN, [GROUND_COUNTRY] = VIEW_GROWN, [GROUND_SEA] = VIEW_SEA, [GROUND_SEA_ICE] = VIEW_ICE};
 
 struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
-	char defines[256];
+	char defines[320];
 	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
-		 "%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n",
-		 sides[variant->side].defines, variant->region, variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers);
+		 "%s%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
+		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n",
+		 sides[variant->side].defines, variant->packed ? "#define FIELD_PACKED 1\n" : "", variant->region,
+		 variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers, variant->projection, variant->large_sun,
+		 variant->ground);
 	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
+	if (variant->ground == VIEW_SEA)
+		desc.samplers[GROUND_SAMPLER] = "sea_sky";
 	return pass_create(compiler, &desc);
 }
 
 /* NULL (and log lines with the driver's message) when it does not compile. */
 static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
-	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region];
+	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region]
+					   [variant->projection][variant->large_sun][variant->packed][variant->ground];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
@@ -46,10 +63,16 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
-	bool ok = (stage->develop = pass_create(compiler, &develop_desc)) != NULL;
+	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, 2) && view_up_init(&stage->up, compiler) &&
+		  height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
-			ok = pass_of(stage, &(struct view_variant){.side = side, .region = region, .shading = SHADING_SOLVED});
+			ok = (side == VIEW_BELOW && region == VIEW_SKY) ||
+			     pass_of(stage, &(struct view_variant){.side = side,
+								   .region = region,
+								   .shading = SHADING_SOLVED,
+								   .packed = side == VIEW_BELOW,
+								   .ground = VIEW_GROWN});
 	if (!ok)
 		view_stage_finish(stage);
 	return ok;
@@ -57,10 +80,14 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
-	pass_destroy(stage->develop);
+	view_up_finish(&stage->up);
+	stage_destroy_passes(stage->develop, 2);
+	texture_finish(&stage->spare);
+	disc_buffer_finish(&stage->disc);
+	height_view_finish(&stage->height);
 	*stage = (struct view_stage){0};
 }
 
@@ -72,37 +99,35 @@ static void set4(float *to, double x, double y, double z, double w)
 	to[3] = (float)w;
 }
 
-static void fill_camera(struct scene_block *block, const struct scene *scene)
+static void fill_camera(struct scene_block *block, const struct scene *scene, const struct camera_view *view)
 {
-	const struct scene_camera *camera = &scene->camera;
-	double axes[3][3];
-	scene_camera_axes(camera, axes);
-	const double tan_v = tan(0.5 * camera->vertical_fov_deg * M_PI / 180);
-	const double tan_h = tan_v * scene->output.width / scene->output.height;
+	const double(*axes)[3] = view->axes;
 	const double tile = scene->clouds.tile_m;
-	const double x = camera->position_m[0], y = camera->position_m[1];
-	set4(block->camera_position, x - tile * floor(x / tile), y - tile * floor(y / tile), camera->position_m[2],
-	     2 * tan_v / scene->output.height);
-	set4(block->camera_right, axes[0][0], axes[0][1], axes[0][2], tan_h);
-	set4(block->camera_up, axes[1][0], axes[1][1], axes[1][2], tan_v);
-	set4(block->camera_forward, axes[2][0], axes[2][1], axes[2][2], camera->projection);
-	set4(block->image_size, scene->output.width, scene->output.height, 1.0 / scene->output.width, 1.0 / scene->output.height);
+	const double x = scene->camera.position_m[0], y = scene->camera.position_m[1], z = scene->camera.position_m[2];
+	set4(block->camera_position, x - tile * floor(x / tile), y - tile * floor(y / tile), z, camera_pixel_angle(view));
+	set4(block->camera_right, axes[0][0], axes[0][1], axes[0][2], view->tangent[0]);
+	set4(block->camera_up, axes[1][0], axes[1][1], axes[1][2], view->tangent[1]);
+	set4(block->camera_forward, axes[2][0], axes[2][1], axes[2][2], view->first_row);
+	set4(block->image_size, view->width, view->height, 1.0 / view->width, 1.0 / view->height);
 }
 
 void view_fill_block(struct scene_block *block, const struct scene *scene)
 {
 	double matrix[3][3];
-	fill_camera(block, scene);
+	const struct camera_view view = camera_view_of(scene, 0);
+	fill_camera(block, scene, &view);
 	colour_band_matrix(matrix);
 	set4(block->band_red, matrix[0][0], matrix[1][0], matrix[2][0], 0);
 	set4(block->band_green, matrix[0][1], matrix[1][1], matrix[2][1], 0);
 	set4(block->band_blue, matrix[0][2], matrix[1][2], matrix[2][2], 0);
 }
 
-static struct cache_key make_key(const struct scene *scene, enum layer layer)
+/* A color alone is made by other programs than one among layers, which is exactly their sum. */
+static struct cache_key make_key(const struct scene *scene, enum layer layer, bool alone)
 {
 	const struct scene_camera *camera = &scene->camera;
 	const double inputs[] = {layer,
+				 alone,
 				 scene->output.width,
 				 scene->output.height,
 				 camera->position_m[0],
@@ -113,6 +138,7 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 				 camera->roll_deg,
 				 camera->vertical_fov_deg,
 				 camera->projection,
+				 camera->face,
 				 scene->model.paths};
 	struct cache_key key = cache_key_make("view");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
@@ -121,22 +147,38 @@ static struct cache_key make_key(const struct scene *scene, enum layer layer)
 	return key;
 }
 
+/* What the cache keeps of a layer. */
+struct picture {
+	struct texture texture;
+	struct texture *spare; /* of the stage */
+};
+
+/* The memory of a picture is worth keeping: software renderers clear what they allocate. */
 static void picture_destroy(void *value)
 {
-	struct texture *picture = value;
-	texture_finish(picture);
+	struct picture *picture = value;
+	texture_finish(picture->spare);
+	*picture->spare = picture->texture;
 	free(picture);
 }
 
-static struct texture *picture_create(const struct scene *scene)
+static struct picture *picture_create(struct view_stage *stage, const struct scene *scene)
 {
-	struct texture *picture = calloc(1, sizeof *picture);
-	if (picture && !texture_init(picture, scene->output.width, scene->output.height, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
-		free(picture);
-		picture = NULL;
-	}
-	if (!picture)
+	struct picture *picture = calloc(1, sizeof *picture);
+	struct texture *spare = &stage->spare;
+	const int width = scene->output.width, height = scene->output.height;
+	if (!picture) {
 		log_error("view: out of memory");
+		return NULL;
+	}
+	picture->spare = spare;
+	if (spare->id && spare->width == width && spare->height == height) {
+		picture->texture = *spare;
+		*spare = (struct texture){0};
+	} else if (!texture_init(&picture->texture, width, height, TEXTURE_RGBA32F, TEXTURE_NEAREST)) {
+		free(picture);
+		return NULL;
+	}
 	return picture;
 }
 
@@ -150,22 +192,28 @@ static enum view_side side_of(const struct scene *scene, const struct view_input
 /* In the order of COMMON_SAMPLERS, CLOUD_SAMPLERS and what the side adds. */
 void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *in)
 {
-	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,     in->sky->to_layer,
-					  in->sky->to_end,        in->ground->map, in->ground->relief};
+	const struct texture *common[] = {in->sky->transmittance, in->sky->total,  in->sky->near,
+					  in->sky->to_layer,      in->sky->to_end, in->ground->map};
 	const int common_count = sizeof common / sizeof *common;
 	memcpy(run->samplers, common, sizeof common);
+	if (in->sea_sky)
+		run->samplers[GROUND_SAMPLER] = in->sea_sky;
 	if (side == VIEW_CLEAR)
 		return;
-	const bool above = side == VIEW_ABOVE;
+	const bool above = side == VIEW_ABOVE, packed = in->field->coarse_packed;
 	const struct texture *clouds[] = {&in->droplets->phase,
 					  &in->droplets->events,
 					  in->slab_rows,
 					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  in->field->smooth,
-					  above ? in->field->height : in->field->coarse,
-					  above ? in->field->maximum : in->field->detail};
+					  above ? in->field->light : in->field->smooth,
+					  above    ? (in->seen ? &in->seen->place : NULL)
+					  : packed ? in->field->coarse_packed
+						   : in->field->coarse,
+					  above    ? (in->seen ? &in->seen->light : NULL)
+					  : packed ? in->field->detail_packed
+						   : in->field->detail};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -176,63 +224,143 @@ static double horizon_sine(const struct scene_block *block, double height)
 	return h < height ? 1 : -sqrt((h - height) * (2 * radius + h + height)) / (radius + h);
 }
 
-/* What the rays of a row of pixels have in common. The sine of the elevation along a row rises and falls at most once, so its ends, its
- * middle and the point nearest to the vertical plane bound it; a margin of two pixels covers the rest. */
-static enum view_region region_of_row(const struct scene_block *block, enum view_side side, int row)
+/* Least and greatest sine of the elevation along a row of pixels. That of a perspective rises and falls at most once along a row, so that
+ * its ends, its middle and points between bound it, but for the bulge between those, the square of their distance. */
+static void bound_row(const struct camera_view *view, int row, double *lowest, double *highest)
 {
 	enum { PROBES = 16 };
-	const double margin = 2 * block->camera_position[3] + 1e-6, ground = horizon_sine(block, 0);
-	/* From above, rays that miss the ground may still graze the layer. */
-	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
-	const double y = 1 - 2 * (row + 0.5) * block->image_size[3];
-	double lowest = 1, highest = -1;
+	const double bulge = view->projection == PROJECTION_PERSPECTIVE ? pow(view->tangent[0] / PROBES, 2) : 0;
+	*lowest = 1;
+	*highest = -1;
 	for (int i = 0; i <= PROBES; i++) {
-		const double x = 2.0 * i / PROBES - 1;
-		double d[3], length = 0;
-		for (int k = 0; k < 3; k++) {
-			d[k] = block->camera_forward[k] + x * block->camera_right[3] * block->camera_right[k] +
-			       y * block->camera_up[3] * block->camera_up[k];
-			length += d[k] * d[k];
-		}
-		lowest = fmin(lowest, d[2] / sqrt(length));
-		highest = fmax(highest, d[2] / sqrt(length));
+		const double at[2] = {(double)view->width * i / PROBES, row + 0.5};
+		double direction[3];
+		camera_direction(view, at, direction);
+		*lowest = fmin(*lowest, direction[2] - bulge);
+		*highest = fmax(*highest, direction[2] + bulge);
 	}
-	/* Between probes a wide row can bulge beyond them by the square of their distance. */
-	const double bulge = pow(block->camera_right[3] / PROBES, 2);
-	if (lowest - bulge > sky + margin)
-		return VIEW_SKY;
-	return highest + bulge < ground - margin ? VIEW_GROUND : VIEW_MIXED;
 }
 
-/* Runs over rows of one kind after the other, each with the program made for it. */
-static bool run_regions(struct view_stage *stage, const struct stage_context *context, struct view_variant variant, struct pass_run *run)
+/* What the rays of a row of pixels have in common, with a margin of two pixels. */
+static enum view_region region_of_row(const struct scene_block *block, const struct camera_view *view, enum view_side side, int row)
 {
-	const int height = run->targets[0]->height;
-	run->width = run->targets[0]->width;
-	for (int first = 0; first < height;) {
-		variant.region = region_of_row(&context->block, variant.side, first);
-		const struct pass *pass = pass_of(stage, &variant);
+	const double margin = 2 * camera_pixel_angle(view) + 1e-6, ground = horizon_sine(block, 0);
+	/* From above, rays that miss the ground may still graze the layer. */
+	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
+	double lowest, highest;
+	if (view->projection == PROJECTION_FISHEYE)
+		return sky < -1e-6 ? VIEW_SKY : VIEW_MIXED; /* it ends at elevation 0 */
+	bound_row(view, row, &lowest, &highest);
+	if (lowest > sky + margin)
+		return VIEW_SKY;
+	return highest < ground - margin ? VIEW_GROUND : VIEW_MIXED;
+}
+
+/* Is no pixel of a row, all above the horizon, larger than half a texel of the field or a texel of the thickness evened out? */
+static bool row_is_near(const struct scene_block *block, const struct camera_view *view, int row)
+{
+	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0];
+	const double texels = fmax(2 * block->cloud_threshold[3], 256);
+	double lowest, highest;
+	bound_row(view, row, &lowest, &highest);
+	const double b = (radius + h) * lowest, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
+	const double mu_v = ((radius + h) * lowest + distance) / (radius + base);
+	/* As camera_footprint in shaders/lib/camera.glsl. */
+	const double slant = view->projection == PROJECTION_FISHEYE ? mu_v : sqrt(mu_v);
+	return mu_v > 0.01 && block->camera_position[3] * distance / slant < block->cloud_layer[2] / texels;
+}
+
+static bool row_has_disc(const struct scene_block *block, bool large, int row)
+{
+	return large || (row >= block->sun_disc_box[1] && row < block->sun_disc_box[1] + block->sun_disc_box[3]);
+}
+
+/* Rows [first, end) up at the layer, as `run` was prepared by view_up_prepare. */
+static bool run_up(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view, struct view_variant variant,
+		   struct pass_run *run, int first, int end)
+{
+	for (int next; first < end; first = next) {
+		const bool near = row_is_near(block, view, first) && !row_has_disc(block, variant.large_sun, first);
+		for (next = first + 1; next < end; next++)
+			if (near != (row_is_near(block, view, next) && !row_has_disc(block, variant.large_sun, next)))
+				break;
+		const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, near, variant.large_sun);
 		if (!pass)
 			return false;
-		int end = first + 1;
-		while (end < height && region_of_row(&context->block, variant.side, end) == variant.region)
-			end++;
 		run->first_row = first;
-		run->height = end - first;
+		run->height = next - first;
 		pass_run(pass, run);
+	}
+	return true;
+}
+
+/* Runs over rows of one kind after the other, each with the program made for it. `up`: how those that look up at the layer are run, or NULL
+ * for the ordinary program. */
+static bool run_regions(struct view_stage *stage, const struct stage_context *context, const struct camera_view *view,
+			struct view_variant variant, struct pass_run *run, struct pass_run *up)
+{
+	const int last = view->first_row + view->height;
+	for (int first = view->first_row; first < last;) {
+		variant.region = region_of_row(&context->block, view, variant.side, first);
+		int end = first + 1;
+		while (end < last && region_of_row(&context->block, view, variant.side, end) == variant.region)
+			end++;
+		if (up && variant.region == VIEW_SKY) {
+			if (!run_up(stage, &context->block, view, variant, up, first, end))
+				return false;
+		} else {
+			const struct pass *pass = pass_of(stage, &variant);
+			if (!pass)
+				return false;
+			run->first_row = first;
+			run->height = end - first;
+			pass_run(pass, run);
+		}
 		first = end;
 	}
 	return true;
 }
 
 /* The whole with one program. Pictures that are rare have no programs for their parts. */
-static bool run_whole(struct view_stage *stage, struct view_variant variant, const struct pass_run *run)
+static bool run_whole(struct view_stage *stage, const struct camera_view *view, struct view_variant variant, struct pass_run *run)
 {
 	variant.region = VIEW_MIXED;
 	const struct pass *pass = pass_of(stage, &variant);
+	run->first_row = view->first_row;
+	run->height = view->height;
 	if (pass)
 		pass_run(pass, run);
 	return pass;
+}
+
+/* One view of the picture after the other. */
+static bool run_views(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		      struct view_variant variant, struct pass_run *run)
+{
+	/* Programs made only for this picture are not worth making three of. */
+	const bool whole = variant.layers || variant.twilight;
+	const bool fast = !whole && variant.side == VIEW_BELOW && variant.shading == SHADING_SOLVED;
+	struct pass_run up = {.targets = run->targets, .width = run->targets[0]->width};
+	const struct view_up_inputs from = {.droplets = inputs->droplets,
+					    .slab_rows = inputs->slab_rows,
+					    .slab_slices = inputs->slab_slices,
+					    .sky = inputs->sky,
+					    .field = inputs->field,
+					    .light = inputs->light};
+	if (fast && !view_up_prepare(&stage->up, context, scene, &from, &up))
+		return false;
+	run->width = up.width;
+	for (int i = 0; i < camera_view_count(scene); i++) {
+		const struct camera_view view = camera_view_of(scene, i);
+		variant.projection = view.projection;
+		variant.large_sun = stage->disc.views[i].large;
+		fill_camera(&context->block, scene, &view);
+		disc_buffer_bind(&stage->disc, i, &context->block);
+		stage_upload_block(context);
+		if (!(whole ? run_whole(stage, &view, variant, run) : run_regions(stage, context, &view, variant, run, fast ? &up : NULL)))
+			return false;
+	}
+	return true;
 }
 
 /* A clear sky has neither shading nor a layer to be lit from below. */
@@ -240,47 +368,66 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 				    bool layers)
 {
 	const enum view_side side = side_of(scene, inputs);
+	const enum view_ground ground = grounds[scene->ground.type];
 	if (side == VIEW_CLEAR)
-		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers};
-	return (struct view_variant){
-		.side = side, .shading = scene->model.shading, .twilight = context->block.slab_light[1] > 0, .layers = layers};
+		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground};
+	return (struct view_variant){.side = side,
+				     .shading = scene->model.shading,
+				     .twilight = context->block.slab_light[1] > 0,
+				     .layers = layers,
+				     .packed = side == VIEW_BELOW && inputs->field->coarse_packed,
+				     .ground = ground};
 }
 
-/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. */
+/* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. alone: the color of all paths, and nothing else, is wanted. */
 static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-		      const enum layer *layers, int count, const struct texture **pictures)
+		      const enum layer *layers, int count, bool alone, const struct texture **textures)
 {
+	struct picture *pictures[VIEW_OUTPUTS] = {0};
 	struct texture *targets[VIEW_OUTPUTS] = {0};
 	struct pass_run run = {.targets = targets};
-	const bool some_paths = scene->model.paths != SCENE_PATHS_ALL;
-	const struct view_variant variant = view_variant_of(context, scene, inputs, count > 1 || layers[0] != LAYER_COLOR || some_paths);
+	const struct view_variant variant = view_variant_of(context, scene, inputs, !alone);
 	for (int i = 0; i <= LAYER_AIR - LAYER_SUN_DIRECT; i++)
 		run.arguments[1 + i / 4][i % 4] = (float)(scene->model.paths >> i & 1);
 	view_bind_inputs(&run, variant.side, inputs);
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
-		targets[i] = picture_create(scene);
-		if (!targets[i])
+		pictures[i] = picture_create(stage, scene);
+		if (!pictures[i])
 			goto fail;
+		targets[i] = &pictures[i]->texture;
 	}
-	const bool whole = variant.layers || variant.twilight;
-	if (!(whole ? run_whole(stage, variant, &run) : run_regions(stage, context, variant, &run)))
+	if (!run_views(stage, context, scene, inputs, variant, &run))
 		goto fail;
 	for (int i = 0; i < count; i++) {
-		const struct cache_key key = make_key(scene, layers[i]);
-		struct texture *picture = targets[i];
-		targets[i] = NULL;
-		if (!cache_keep(context->cache, &key, picture, texture_bytes(picture), picture_destroy))
+		const struct cache_key key = make_key(scene, layers[i], alone);
+		struct picture *picture = pictures[i];
+		pictures[i] = NULL;
+		if (!cache_keep(context->cache, &key, picture, texture_bytes(&picture->texture), picture_destroy))
 			goto fail;
-		pictures[i] = picture;
+		textures[i] = &picture->texture;
 	}
 	return true;
 
 fail:
 	for (int i = 0; i < count; i++)
-		if (targets[i])
-			picture_destroy(targets[i]);
+		if (pictures[i])
+			picture_destroy(pictures[i]);
 	return false;
+}
+
+/* What the picture sees of the layer below the camera, one view after the other. */
+static bool see_layer(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct field_maps *field,
+		      struct height_view *seen)
+{
+	bool ok = height_view_create(scene, seen);
+	for (int i = 0; ok && i < camera_view_count(scene); i++) {
+		const struct camera_view view = camera_view_of(scene, i);
+		fill_camera(&context->block, scene, &view);
+		stage_upload_block(context);
+		ok = height_view_run(&stage->height, scene, &view, field, seen);
+	}
+	return ok;
 }
 
 bool view_stage_run(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
@@ -288,32 +435,40 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 		    const struct texture **pictures)
 {
 	enum layer missing[LAYER_COUNT];
+	const bool alone = count == 1 && layers[0] == LAYER_COLOR && scene->model.paths == SCENE_PATHS_ALL;
 	int place[LAYER_COUNT], missing_count = 0;
 	for (int i = 0; i < count; i++) {
-		const struct cache_key key = make_key(scene, layers[i]);
-		pictures[i] = cache_find(context->cache, &key);
-		if (!pictures[i]) {
+		const struct cache_key key = make_key(scene, layers[i], alone);
+		const struct picture *picture = cache_find(context->cache, &key);
+		if (picture) {
+			pictures[i] = &picture->texture;
+		} else {
 			place[missing_count] = i;
 			missing[missing_count++] = layers[i];
 		}
 	}
-	if (missing_count > 0)
-		context->reused = false;
-	for (int i = 0; i < missing_count;) {
-		if (cancelled && cancelled(cancel_context))
-			return false;
+	if (missing_count == 0)
+		return true;
+	context->reused = false;
+	struct height_view seen = {0};
+	struct view_inputs with_seen = *inputs;
+	with_seen.seen = &seen;
+	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0)) &&
+		  (side_of(scene, inputs) != VIEW_ABOVE || see_layer(stage, context, scene, inputs->field, &seen));
+	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
-		if (!run_group(stage, context, scene, inputs, missing + i, group, made))
-			return false;
+		ok = !(cancelled && cancelled(cancel_context)) &&
+		     run_group(stage, context, scene, &with_seen, missing + i, group, alone, made);
 		for (int k = 0; k < group; k++)
 			pictures[place[i + k]] = made[k];
 		i += group;
 	}
-	return true;
+	height_view_release(&seen);
+	return ok;
 }
 
 void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)
 {
-	pass_run(stage->develop, &(struct pass_run){.targets = &target, .samplers = {picture}});
+	pass_run(stage->develop[target->format == TEXTURE_RGBA8], &(struct pass_run){.targets = &target, .samplers = {picture}});
 }

@@ -5,7 +5,9 @@
 #ifndef STRATUS_RENDERER_STAGES_VIEW_H
 #define STRATUS_RENDERER_STAGES_VIEW_H
 
-#include "renderer/stages/radiosity.h"
+#include "renderer/stages/disc.h"
+#include "renderer/stages/height_view.h"
+#include "renderer/stages/view_up.h"
 
 /* Layers that one run of the view pass makes. */
 enum { VIEW_OUTPUTS = 4 };
@@ -16,21 +18,32 @@ enum view_side { VIEW_CLEAR, VIEW_BELOW, VIEW_ABOVE, VIEW_SIDES };
 /* Rows of the picture: rays of either kind, all to the ground, none to the ground. The numbers stand in shaders/lib/view.glsl. */
 enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 
+/* What the ground is close by. The numbers stand in shaders/lib/ground.glsl. */
+enum view_ground { VIEW_BARE, VIEW_GROWN, VIEW_SEA, VIEW_ICE, VIEW_GROUNDS };
+
 /* The view pass exists in many forms, since software renderers execute both sides of every branch. */
 struct view_variant {
 	enum view_side side;
 	enum view_region region;
 	enum shading shading;
-	bool twilight; /* the base of the layer is lit by the sun somewhere */
-	bool layers;   /* several, else the color alone */
+	bool twilight;              /* the base of the layer is lit by the sun somewhere */
+	bool layers;                /* several, else the color alone */
+	enum projection projection; /* of a camera_view */
+	bool large_sun;             /* sun_disc.large */
+	enum view_ground ground;
+	bool packed; /* the field, from below */
 };
 
 struct view_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	/* By shading, side, twilight, layers, region. Those that most pictures need are made at the start, the others with the first
-	 * picture that wants them. */
-	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS];
-	struct pass *develop;
+	/* By shading, side, twilight, layers, region, projection, large sun, packed, ground. Those that most pictures need are made at the
+	 * start, the others with the first picture that wants them. */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][2][VIEW_GROUNDS];
+	struct view_up_stage up;
+	struct height_view_stage height;
+	struct pass *develop[2]; /* into codes of 16 and of 8 bits */
+	struct texture spare;    /* of a picture that was dropped, to be used again; may be none */
+	struct disc_buffer disc; /* of the last picture made */
 };
 
 struct view_inputs {
@@ -40,12 +53,15 @@ struct view_inputs {
 	const struct sky_tables *sky;
 	const struct field_maps *field;
 	const struct radiosity_light *light; /* NULL without clouds */
+	const struct height_view *seen;      /* of the view stage's own making: what the pixels see of the layer from above */
+	const struct texture *sea_sky;       /* what a sea mirrors; NULL for other grounds */
 };
 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler);
 void view_stage_finish(struct view_stage *stage);
 
-/* Fills in the block's camera. Call before any pass runs, since the sky is tabulated from the camera's height. */
+/* Fills in the block's camera, of the picture's first view. Call before any pass runs, since the sky is tabulated from the camera's height.
+ */
 void view_fill_block(struct scene_block *block, const struct scene *scene);
 
 /* Renders layers[0..count) into textures of the output's size (RGBA32F), owned by the cache and valid for this frame. cancelled may be

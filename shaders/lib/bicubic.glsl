@@ -26,4 +26,13 @@ bicubic_samples bicubic_at(vec2 uv, float size)
 	s.far = (base + 1.5 + w3 / (1.0 - s.share)) / size;
 	return s;
 }
+
+// Level 0 of a texture of `size` texels a side.
+vec4 bicubic_sample(sampler2D source, vec2 uv, float size)
+{
+	bicubic_samples s = bicubic_at(uv, size);
+	vec4 a = mix(textureLod(source, vec2(s.far.x, s.near.y), 0.0), textureLod(source, s.near, 0.0), s.share.x);
+	vec4 b = mix(textureLod(source, s.far, 0.0), textureLod(source, vec2(s.near.x, s.far.y), 0.0), s.share.x);
+	return mix(b, a, s.share.y);
+}
 #endif

@@ -37,12 +37,22 @@ float colour_srgb(float x)
 	return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055;
 }
 
+// The same by roots alone, for x >= 0: within 3.2e-5, a hundredth of a code of 8 bits. Powers are dear on a processor.
+float colour_srgb_near(float x)
+{
+	float r2 = sqrt(x);
+	float r4 = sqrt(r2);
+	float r8 = sqrt(r4);
+	return x <= 0.0031308 ? 12.92 * x : 0.65398335 * r2 + 0.68871564 * r4 - 0.31847588 * r8 - 0.0201874 * x - 0.00406698;
+}
+
 // Triangular noise of one code either side, fixed to the pixel, which hides the steps of 8 bits in a smooth sky.
 vec3 colour_dither(ivec2 pixel)
 {
 	uint h = noise_hash2(pixel.x, pixel.y, 5u);
 	uint k = noise_hash(h);
-	return vec3(noise_unit(h) + noise_unit(k), noise_unit(noise_hash(k)) + noise_unit(noise_hash(h + 1u)),
-	            noise_unit(noise_hash(k + 1u)) + noise_unit(noise_hash(h + 2u))) - 1.0;
+	// Three numbers of ten bits out of each hash.
+	vec3 sum = vec3(float((h & 1023u) + (k & 1023u)), float((h >> 10u & 1023u) + (k >> 10u & 1023u)), float((h >> 20u & 1023u) + (k >> 20u & 1023u)));
+	return (sum + 1.0) * (1.0 / 1024.0) - 1.0;
 }
 #endif

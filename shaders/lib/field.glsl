@@ -2,6 +2,7 @@
 #ifndef SHADERS_LIB_FIELD
 #define SHADERS_LIB_FIELD
 #include "shaders/lib/bicubic.glsl"
+#include "shaders/lib/packed.glsl"
 #include "shaders/lib/scene_block.glsl"
 
 #ifndef __cplusplus
@@ -9,43 +10,101 @@ uniform sampler2D field_coarse;
 uniform sampler2D field_detail;
 #endif
 
-// Excess density, over its range, at which the edge of a cloud has half the thickness that its middle would have.
-const float FIELD_SKIRT = 0.06;
+// A tile of detail is this many times finer than the field, or the tile of detail, above it.
+const float FIELD_DETAIL_STEP = 8.0;
 
-float field_bicubic(sampler2D field, vec2 uv, float size, float lod)
+// octaves: by which a pixel is larger than a texel. Splines are for texels larger than pixels. They are read as level 0 alone, since their samples fit its
+// texels, and run together to one point as texels and pixels become equal; further levels are for smaller texels.
+float field_bicubic(sampler2D field, vec2 uv, float size, float octaves)
 {
 	bicubic_samples s = bicubic_at(uv, size);
+	float lod = max(octaves, 0.0);
+	float spread = clamp(-octaves, 0.0, 1.0);
+	s.near = mix(uv, s.near, spread);
+	s.far = mix(uv, s.far, spread);
 	float a = mix(textureLod(field, vec2(s.far.x, s.near.y), lod).x, textureLod(field, s.near, lod).x, s.share.x);
 	float b = mix(textureLod(field, s.far, lod).x, textureLod(field, vec2(s.near.x, s.far.y), lod).x, s.share.x);
 	return mix(b, a, s.share.y);
+}
+
+// Texels of the detail's side.
+const int FIELD_DETAIL_SIZE = 512;
+
+// Both pictures at a place in their tiles, seen by a pixel that is larger than a texel by so many octaves. FIELD_PACKED: the samplers hold them packed
+// (shaders/lib/packed.glsl); FIELD_NEAR: all pixels are smaller than half a texel of the field.
+float field_coarse_at(vec2 uv, float octaves)
+{
+#if defined(FIELD_PACKED) && defined(FIELD_NEAR)
+	return packed_spline(field_coarse, uv, int(cloud_threshold.w), 0);
+#elif defined(FIELD_PACKED)
+	int side = int(cloud_threshold.w);
+	return mix(packed_linear_between(field_coarse, uv, side, octaves), packed_spline(field_coarse, uv, side, 0), clamp(-octaves, 0.0, 1.0));
+#else
+	return field_bicubic(field_coarse, uv, cloud_threshold.w, octaves);
+#endif
+}
+
+float field_detail_at(vec2 uv, float octaves)
+{
+#ifdef FIELD_PACKED
+	return packed_linear_between(field_detail, uv, FIELD_DETAIL_SIZE, octaves);
+#else
+	return textureLod(field_detail, uv, max(0.0, octaves)).x;
+#endif
+}
+
+// Octaves by which the footprint is larger than a texel of the field.
+float field_octaves(float footprint)
+{
+	return log2(footprint * cloud_threshold.w / cloud_layer.z);
+}
+
+// Where detail is read at a place p in the drifting field: elsewhere where the density is another, so that its repeat does not show.
+vec2 field_detail_place(vec2 p, float density)
+{
+	return (p - vec2(cloud_detail.y, cloud_detail.z) + cloud_field.y * density * vec2(1.0, 0.6)) / cloud_detail.x;
 }
 
 // The field before its threshold. place: metres east and north of the tile's corner; footprint: size of the pixel there, m.
 float field_density(vec2 place, float footprint)
 {
 	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
-	float texel = cloud_layer.z / cloud_threshold.w;
-	float lod = max(0.0, log2(footprint / texel));
-	// From the second level on, the spline would only blur what is already small: size of the level's texels.
-	float size = cloud_threshold.w * exp2(-floor(lod));
-	float density = field_bicubic(field_coarse, p / cloud_layer.z, size, lod);
-	float relative = footprint * (1.0 / 30.0);
-	float fade = cloud_detail.w / (1.0 + relative * relative);
-	if (fade > 0.004)
-		density += fade * textureLod(field_detail, (p - vec2(cloud_detail.y, cloud_detail.z)) / cloud_detail.x,
-		                             max(0.0, log2(footprint * 512.0 / cloud_detail.x))).x;
+	float octaves = field_octaves(footprint);
+	float density = field_coarse_at(p / cloud_layer.z, octaves);
+	vec2 uv = field_detail_place(p, density);
+	float sum = field_detail_at(uv, octaves + 3.0);
+	float weight = 0.5;
+	for (int i = 1; i < int(cloud_field.z); i++) {
+		uv *= FIELD_DETAIL_STEP;
+		sum += weight * field_detail_at(uv, octaves + 6.0);
+		weight *= 0.5;
+		octaves += 3.0;
+	}
+	density += cloud_detail.w * sum;
 	return density;
 }
 
-// Thickness H in m, 0..maximum, of a density. The threshold is softened (softplus) over what the footprint hides.
+// Thickness H in m, 0..maximum, of a density. The threshold is softened over what the footprint hides.
 float field_thickness_of(float density, float footprint)
 {
 	float excess = (density - cloud_threshold.x) * cloud_threshold.y;
-	float softness = 0.012 + 0.05 * (1.0 - exp(-footprint * (1.0 / 150.0)));
-	float x = excess / softness;
-	float soft = x > 20.0 ? excess : x < -12.0 ? 0.0 : softness * log(1.0 + exp(x));
-	// A thin skirt around a thick middle: edges are translucent over some 100 m.
-	return cloud_layer.y * min(pow(soft, cloud_threshold.z) * soft / (soft + FIELD_SKIRT), 1.0);
+	// What is finer than the footprint varies as its cubic root, with the spectrum k^(-8/3).
+	float hidden = exp2(min(field_octaves(footprint) + 1.0, 5.0) * (1.0 / 3.0));
+	float softness = 0.003 + 0.8 * cloud_detail.w * cloud_threshold.y * hidden;
+	// Mean of what is above the threshold, of values spread evenly by the softness to either side.
+	float above = max(excess + softness, 0.0);
+	float soft = excess > softness ? excess : above * above / (4.0 * softness);
+	// A thin skirt around a thick middle: edges are translucent over some 100 m. A map says itself how thick its clouds are.
+	float share = (1.0 - pow(max(1.0 - soft, 0.0), cloud_threshold.z)) * soft * (1.0 + cloud_field.x) / (soft + cloud_field.x);
+	return cloud_layer.y * clamp(cloud_threshold.z > 0.0 ? share : density, 0.0, 1.0);
+}
+
+// The same for a shadow, whose penumbra hides the detail and which is seen at a slant: no spline, but two levels whose texels blur as much.
+float field_thickness_shadow(vec2 place, float footprint)
+{
+	float lod = max(0.6, log2(footprint * cloud_threshold.w / cloud_layer.z));
+	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	return field_thickness_of(textureLod(field_coarse, uv, lod).x, footprint);
 }
 
 float field_thickness(vec2 place, float footprint)

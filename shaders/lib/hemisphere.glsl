@@ -50,12 +50,19 @@ hemisphere_sample hemisphere_near(vec2 at, float count)
 	return s;
 }
 
-// A direction on the sun's disc; the weight is that of its radiance (limb darkened as in view_sun_disc), with a mean of 1.
-hemisphere_sample hemisphere_disc(vec2 at)
+// Light from within a share of the disc's area round its middle, limb darkened by 1 - u (1 - cos), u = 0.6 (renderer/sun_disc.h).
+float hemisphere_disc_light(float area)
+{
+	float left = 1.0 - area;
+	return (0.4 * area + 0.4 * (1.0 - left * sqrt(left))) / 0.8;
+}
+
+// A direction on the sun's disc, in one of `rows` rings of equal area; the weight is that of the ring's light, with a mean of exactly 1.
+hemisphere_sample hemisphere_disc(vec2 at, float rows)
 {
 	hemisphere_sample s;
 	s.direction = hemisphere_from_sun(sun_direction.w * sqrt(at.y), 2.0 * PI * at.x);
-	s.weight = (1.0 - 0.6 * (1.0 - sqrt(1.0 - at.y))) / 0.8;
+	s.weight = rows * (hemisphere_disc_light(min(at.y + 0.5 / rows, 1.0)) - hemisphere_disc_light(max(at.y - 0.5 / rows, 0.0)));
 	return s;
 }
 #endif

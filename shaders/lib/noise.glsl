@@ -77,28 +77,62 @@ float noise_turbulence(vec2 p, int period, int octaves, uint seed, float turns)
 	return sum / sqrt(power);
 }
 
-// Convective cells: 1 in the middle of a cell, 0 at its border and beyond: 1 - (distance/reach)^2 to the nearest centre. Each centre grows, moves to another place and
-// shrinks again over a life of its own; `lives`: how many lives have passed. p in lattice cells, repeating after `period`.
-float noise_cells(vec2 p, int period, uint seed, float lives, float reach)
+// Of things that live one life after the other, each born at its own moment: in which life the one of this hash is, mixed into the hash, and how far (0..1).
+// whole, fraction: lives that a thing of phase 0 has had, in two parts so that no time is too late for single precision.
+struct noise_life {
+	uint hash;
+	float age;
+};
+
+noise_life noise_life_of(uint hash, float whole, float fraction)
+{
+	float age = fraction + noise_unit(hash);
+	float later = step(1.0, age);
+	noise_life life;
+	life.hash = hash + uint(int(whole) + int(later)) * 0x9e3779b1u;
+	life.age = age - later;
+	return life;
+}
+
+// A value at a lattice point: mean 0, variance 1, skewed to few high ones among many low ones, as cloud is made of lumps.
+float noise_lump(uint hash)
+{
+	float u = noise_unit(hash);
+	// u^2 has mean 1/3 and variance 4/45.
+	return (u * u - 1.0 / 3.0) * 3.354102;
+}
+
+// The value of a lattice point that fades from one life's into the next one's, at constant variance.
+float noise_living(uint hash, float whole, float fraction)
+{
+	noise_life life = noise_life_of(hash, whole, fraction);
+	float share = life.age * life.age * (3.0 - 2.0 * life.age);
+	float rest = 1.0 - share;
+	return (rest * noise_lump(noise_hash(life.hash)) + share * noise_lump(noise_hash(life.hash + 0x9e3779b1u))) * inversesqrt(rest * rest + share * share);
+}
+
+// Squared distances to the nearest and second nearest centre of cells. Each centre grows, shrinks and comes again elsewhere, one life after the other, and is
+// farther away from everything by up to 1 while it is weak. Neither is more than 1, beyond which centres may lie that were not looked at. p in lattice cells,
+// repeating after `period`; scatter: 0 on a lattice, 1 anywhere.
+vec2 noise_centres(vec2 p, int period, uint seed, float whole, float fraction, float scatter)
 {
 	vec2 cell = floor(p);
-	float nearest = 9.0;
+	float first = 1.0;
+	float second = 1.0;
 	for (int dy = -1; dy <= 1; dy++) {
 		for (int dx = -1; dx <= 1; dx++) {
 			int x = int(cell.x) + dx;
 			int y = int(cell.y) + dy;
-			uint h = noise_hash2(noise_wrap(x, period), noise_wrap(y, period), seed);
-			float age = lives + noise_unit(h) * 16.0;
-			float generation = floor(age);
-			age -= generation;
-			uint place = noise_hash(h + uint(int(generation)) * 7919u);
-			vec2 centre = vec2(float(x), float(y)) + vec2(noise_unit(place), noise_unit(noise_hash(place)));
-			// At birth and death a centre is so weak that its neighbours take its place.
-			float weakness = 1.0 - smoothstep(0.0, 0.2, age) * (1.0 - smoothstep(0.8, 1.0, age));
-			vec2 away = centre - p;
-			nearest = min(nearest, dot(away, away) + 2.0 * weakness);
+			noise_life life = noise_life_of(noise_hash2(noise_wrap(x, period), noise_wrap(y, period), seed), whole, fraction);
+			uint place = noise_hash(life.hash);
+			vec2 jitter = vec2(float(place & 0xffffu), float(place >> 16u)) * (1.0 / 65536.0) - 0.5;
+			vec2 away = vec2(float(x), float(y)) + 0.5 + scatter * jitter - p;
+			float weakness = 1.0 - smoothstep(0.0, 0.25, life.age) * (1.0 - smoothstep(0.75, 1.0, life.age));
+			float distance = dot(away, away) + weakness;
+			second = min(second, max(first, distance));
+			first = min(first, distance);
 		}
 	}
-	return max(0.0, 1.0 - nearest / (reach * reach));
+	return vec2(first, second);
 }
 #endif

@@ -1,6 +1,7 @@
 // The scene as uniforms; what each member is: renderer/scene_block.h.
 #ifndef SHADERS_LIB_SCENE_BLOCK
 #define SHADERS_LIB_SCENE_BLOCK
+const int SEA_WAVES = 24;
 #ifndef __cplusplus
 layout(std140, binding = 0) uniform scene_block {
 	vec4 sun_direction;
@@ -18,6 +19,7 @@ layout(std140, binding = 0) uniform scene_block {
 	vec4 camera_up;
 	vec4 camera_forward;
 	vec4 image_size;
+	vec4 sun_disc_box;
 	vec4 cloud_layer;
 	vec4 cloud_field;
 	vec4 cloud_drift;
@@ -36,6 +38,8 @@ layout(std140, binding = 0) uniform scene_block {
 	vec4 band_green;
 	vec4 band_blue;
 	vec4 develop;
+	vec4 sea_state;
+	vec4 sea_waves[SEA_WAVES];
 };
 uniform vec4 arguments[4];
 #define INOUT(type) inout type

@@ -4,9 +4,14 @@
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/field.glsl"
 #include "shaders/lib/ground.glsl"
-#include "shaders/lib/height.glsl"
+#include "shaders/lib/ground_near.glsl"
+#include "shaders/lib/height_sun.glsl"
+#if VIEW_GROUND == 2
+#include "shaders/lib/sea.glsl"
+#endif
 #include "shaders/lib/sky_table.glsl"
 #include "shaders/lib/slab_solved.glsl"
+#include "shaders/lib/sun_disc.glsl"
 #include "shaders/lib/sunlight.glsl"
 
 #ifndef __cplusplus
@@ -41,45 +46,65 @@ float view_sun_cosine(vec3 direction, float t, float height)
 	return clamp(((EARTH_RADIUS + camera_position.z) * sun.z + t * dot(direction, sun)) / (EARTH_RADIUS + height), -1.0, 1.0);
 }
 
-// The unscattered disc of the sun, limb darkened: 1 - u (1 - cos), u = 0.6 in the visible (Allen 1973), whose mean over the disc is 1 - u/3.
-vec3 view_sun_disc(vec3 direction)
-{
-	float angle = length(direction - vec3(sun_direction));
-	float radius = sun_direction.w;
-	float pixel = camera_position.w;
-	float cover = clamp(0.5 + (radius - angle) / pixel, 0.0, 1.0);
-	float rho = min(angle / radius, 1.0);
-	float limb = (1.0 - 0.6 * (1.0 - sqrt(1.0 - rho * rho))) / 0.8;
-	return vec3(sun_at_camera) * (cover * limb / (PI * radius * radius));
-}
-
 #if VIEW_CLOUDS
-// Thickness H at a place. From above it is that of the height field, which the view meets too.
+// Thickness H at a place. From above: what the beam passes on its way to that place of the base, with all that stands towards the sun.
 float view_thickness(vec2 place, float footprint)
 {
 #if VIEW_ABOVE
-	return height_at(place, footprint);
+	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	return textureLod(height_light, uv, max(0.0, log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z))).z;
 #else
 	return field_thickness(place, footprint);
 #endif
 }
 #endif
 
-// Radiance of the ground under sun, sky and clouds, before the air between.
-vec3 view_ground(vec2 place, float footprint, float mu_sun)
+#if VIEW_CLOUDS
+// Thickness that a shadow on the ground is of.
+float view_shadow_thickness(vec2 place, float footprint)
 {
+#if VIEW_ABOVE
+	return view_thickness(place, footprint);
+#else
+	return field_thickness_shadow(place, footprint);
+#endif
+}
+#endif
+
+// Radiance of the ground under sun, sky and clouds, before the air between.
+vec3 view_ground(vec2 place, ground_point point)
+{
+	float mu_sun = point.mu_sun;
+	// A pixel covers a long strip at a slant, which the means of squares stand for: larger ones than of the strip's area, lest rows at the horizon show single places.
+	float footprint = point.across * pow(point.mu_v, -0.75);
 	vec3 received = vec3(sky_irradiance_ground);
-	vec3 direct = sun_irradiance(0.0, mu_sun) * max(mu_sun, 0.0);
+	vec3 beam = sun_irradiance(0.0, mu_sun);
 #if VIEW_CLOUDS
 	{
 		received = vec3(textureLod(ground_received, place / cloud_layer.z, 0.0));
 		// The beam passed the layer where the parallax says; its shadow is as soft as the sun is wide.
 		vec2 through = place + vec2(sun_direction) * cloud_layer.x / max(sun_direction.z, 0.02);
 		float penumbra = 2.0 * sun_direction.w * cloud_layer.x;
-		direct *= slab_directional_transmittance(view_thickness(through, max(footprint, penumbra)));
+		beam *= slab_directional_transmittance(view_shadow_thickness(through, max(footprint, penumbra)));
 	}
 #endif
-	return ground_reflectance(place, footprint) * (received + direct) / PI;
+#if VIEW_GROUND == 2
+	vec2 heading = -point.offset * inversesqrt(max(dot(point.offset, point.offset), 1e-8));
+	vec2 flat_sun = vec2(sun_direction.x, sun_direction.y) * inversesqrt(max(1.0 - sun_direction.z * sun_direction.z, 1e-8));
+	vec3 to_viewer = vec3(heading * sqrt(1.0 - point.mu_v * point.mu_v), point.mu_v);
+	vec3 to_sun = vec3(flat_sun * sqrt(1.0 - mu_sun * mu_sun), mu_sun);
+	sea_slopes slopes = sea_slopes_at(point.offset, heading, point.across, point.across / point.mu_v);
+	return ground_patch.y * sea_radiance(slopes, to_viewer, to_sun, beam, received);
+#else
+	vec2 detail = ground_detail(point);
+	vec3 direct = beam * max(mu_sun, 0.0);
+#if VIEW_GROUND == 3
+	vec3 reflectance = ground_ice(ground_reflectance(place + ground_ragged(point), footprint), footprint);
+#else
+	vec3 reflectance = ground_reflectance(place, footprint);
+#endif
+	return reflectance * (received + direct * detail.x) * (detail.y / PI);
+#endif
 }
 
 #if VIEW_CLOUDS
@@ -92,9 +117,11 @@ struct view_point {
 	float mu_sun;      // of the sun, negative below the layer's horizon
 	float cos_azimuth; // between the headings of light before and after
 	vec2 half_angle;   // of scattering
-	float depth_facet; // thickness along the normal of the surface over H, and cosines to it; 1 and those above on a flat base
-	float mu_l_facet;
+	float way;         // through cloud to the viewer, m
+	float mu_l_facet;  // cosines to the surface; those above on a flat base
 	float mu_v_facet;
+	float lit;         // share of the beam that comes there past other clouds
+	float received;    // by light that is scattered often, relative to a flat top
 };
 
 // cos_view: cosine of the viewing direction to the local vertical, positive upwards.
@@ -120,9 +147,9 @@ struct view_orders {
 	vec3 order2;
 };
 
-view_orders view_orders_of(view_point p, float m_l, float m_v, float depth_scale, float facing, bool through)
+view_orders view_orders_of(view_point p, float m_l, float m_v, float thickness, float facing, bool through)
 {
-	vec3 tau = vec3(extinction_modified) * (p.thickness * depth_scale);
+	vec3 tau = vec3(extinction_modified) * thickness;
 	vec3 shape = (through ? slab_single_transmitted(tau, m_l, m_v) : facing * slab_single_reflected(tau, m_l, m_v)) * (0.25 / PI);
 	vec3 p_f = vec3(1.0) - vec3(extinction_modified) / vec3(extinction);
 	vec3 full = phase_full(p.half_angle);
@@ -150,29 +177,31 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 	float mu_l = view_lit_cosine(base ? -p.mu_sun : p.mu_sun);
 	float m_l = max(mu_l, 0.01);
 	float m_v = p.mu_v;
-	float depth_scale = 1.0;
+	float thickness = p.thickness;
 	float facing = 1.0;
+	float received = 1.0;
 #if VIEW_ABOVE
 	if (!through) {
 		// A facet turned away from light or view is faded out instead of cut.
-		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * smoothstep(-0.05, 0.10, p.mu_v_facet);
+		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * smoothstep(-0.05, 0.10, p.mu_v_facet) * p.lit;
 		m_l = max(p.mu_l_facet, 0.03);
 		m_v = max(p.mu_v_facet, 0.03);
-		depth_scale = p.depth_facet;
+		thickness = p.way * m_v;
+		received = p.received;
 	}
 #endif
 	sun *= mu_l / max(mu_l, 0.01);
 #if VIEW_SOLVED
-	vec3 first = facing * sun * solved_first(p.half_angle, vec3(extinction_scaled) * (p.thickness * depth_scale), m_l, m_v, through);
-	vec3 rest = sun * solved_multiple(base ? slab_light.x : 0.0, p.smooth_thickness, vec3(extinction_scaled) * p.thickness, max(mu_l, 0.01), p.mu_v,
-	                                  p.view_index, p.cos_azimuth);
+	vec3 first = facing * sun * solved_first(p.half_angle, vec3(extinction_scaled) * thickness, m_l, m_v, through);
+	vec3 rest = received * sun * solved_multiple(base ? slab_light.x : 0.0, p.smooth_thickness, vec3(extinction_scaled) * (p.way * p.mu_v),
+	                                             max(mu_l, 0.01), p.mu_v, p.view_index, p.cos_azimuth);
 #if VIEW_COLOR_ONLY
 	parts.order1 += first;
 	parts.multiple += rest;
 #else
 	// The sum is the solver's. In layers the orders 0 to 2 are those of the modified phase function and 3+ is what they leave of the solver's
 	// orders; what these four miss or exceed the sum by, a few percent, is shared out.
-	view_orders orders = view_orders_of(p, m_l, m_v, depth_scale, facing, through);
+	view_orders orders = view_orders_of(p, m_l, m_v, thickness, facing, through);
 	vec3 many = rest * max(1.0 - sun.y * orders.order2.y / max(rest.y, 1e-20), 0.0);
 	vec3 share = (first + rest) / max(sun * (orders.order0 + orders.order1 + orders.order2) + many, vec3(1e-20));
 	parts.order0 += sun * orders.order0 * share;
@@ -181,11 +210,13 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 	parts.multiple += many * share;
 #endif
 #else
-	view_orders orders = view_orders_of(p, m_l, m_v, depth_scale, facing, through);
+	view_orders orders = view_orders_of(p, m_l, m_v, thickness, facing, through);
 	parts.order0 += sun * orders.order0;
 	parts.order1 += sun * orders.order1;
 	parts.order2 += sun * orders.order2;
-	parts.multiple += sun * (max(mu_l, 0.01) / PI) * slab_multiple(p.thickness, through);
+	// Edges that the view passes on a short way are a part of what the slab would be.
+	vec3 seen = min((vec3(1.0) - exp(-vec3(extinction) * p.way)) / (vec3(1.0) - exp(-vec3(extinction) * (p.thickness + 1e-3) / p.mu_v)), vec3(1.0));
+	parts.multiple += seen * received * sun * (max(mu_l, 0.01) / PI) * slab_multiple(p.thickness, through);
 #endif
 }
 
@@ -202,7 +233,7 @@ void view_layer_sunlight(view_point p, vec3 sun, INOUT(view_parts) parts)
 // is seen through it.
 void view_layer_diffuse(view_point p, vec3 sky, vec3 ground, INOUT(view_parts) parts)
 {
-	parts.transmittance = exp(-vec3(extinction_scaled) * (p.thickness * p.depth_facet / max(p.mu_v_facet, 0.03)));
+	parts.transmittance = exp(-vec3(extinction_scaled) * p.way);
 	vec3 met = (vec3(1.0) - parts.transmittance) / PI;
 	vec3 share = slab_diffuse_share(p.smooth_thickness, p.view_index);
 #if VIEW_ABOVE
@@ -215,25 +246,23 @@ void view_layer_diffuse(view_point p, vec3 sky, vec3 ground, INOUT(view_parts) p
 	parts.optical_thickness = extinction.y * p.thickness;
 }
 
-view_point view_point_at(vec3 direction, vec2 place, float footprint, float cos_view, float mu_sun)
+view_point view_point_at(vec3 direction, float thickness, float smooth_thickness, float cos_view, float mu_sun)
 {
 	view_point p;
-	p.thickness = view_thickness(place, footprint);
-#if VIEW_SOLVED
+	p.thickness = thickness;
 	// The more often light is scattered on its way, the more of it has come from the side.
-	float spread = slab_light.w * p.thickness;
-	p.smooth_thickness = mix(p.thickness, height_smooth(place, footprint), spread / (1.0 + spread));
-#else
-	p.smooth_thickness = p.thickness;
-#endif
+	float spread = VIEW_SOLVED > 0 ? slab_light.w * thickness : 0.0;
+	p.smooth_thickness = mix(thickness, smooth_thickness, spread / (1.0 + spread));
 	p.mu_v = max(abs(cos_view), 0.01);
 	p.view_index = slab_view_index(p.mu_v);
 	p.mu_sun = mu_sun;
 	p.cos_azimuth = view_cos_azimuth(direction, cos_view, mu_sun);
 	p.half_angle = scattering_half_angle(-vec3(sun_direction), -direction);
-	p.depth_facet = 1.0;
+	p.way = thickness / p.mu_v;
 	p.mu_l_facet = abs(mu_sun);
 	p.mu_v_facet = p.mu_v;
+	p.lit = 1.0;
+	p.received = 1.0;
 	return p;
 }
 #endif
@@ -269,21 +298,22 @@ void view_attenuate(vec3 air, INOUT(view_parts) parts)
 
 #if VIEW_CLOUDS && !VIEW_ABOVE
 // Upwards from below the layer.
-view_parts view_from_below(vec3 direction, vec2 air)
+view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 {
 	view_parts parts = view_nothing();
 	float base = cloud_layer.x;
 	float t = sphere_distance_up(camera_position.z, direction.z, base);
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
-	view_point p = view_point_at(direction, place, camera_position.w * t * inversesqrt(cos_view), cos_view, view_sun_cosine(direction, t, base));
+	float footprint = camera_footprint(t, cos_view);
+	view_point p = view_point_at(direction, view_thickness(place, footprint), height_smooth(place, footprint), cos_view, view_sun_cosine(direction, t, base));
 
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
 	view_layer_sunlight(p, vec3(textureLod(air_to_end, air, 0.0)) * float(p.thickness > 0.01), parts);
 	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud), to_layer * vec3(textureLod(cloud_received, place / cloud_layer.z, 0.0)), parts);
 
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
-	parts.sun_direct = view_sun_disc(direction) * exp(-vec3(extinction) * (p.thickness / p.mu_v));
+	parts.sun_direct = disc * exp(-vec3(extinction) * (p.thickness / p.mu_v));
 	parts.sky = max(vec3(textureLod(sky_total, air, 0.0)) - near, vec3(0.0)) * parts.transmittance;
 	parts.air = near * vec3(air_below) + (vec3(1.0) - to_layer) * vec3(air_around);
 	parts.distance = p.thickness > 0.01 ? t : 0.0;
@@ -292,35 +322,25 @@ view_parts view_from_below(vec3 direction, vec2 air)
 #endif
 
 #if VIEW_ABOVE
-// Distance to the cloud top along a ray from above, or -1.
-float view_cloud_distance(vec3 direction)
+// The cloud that a ray from above meets, as shaders/passes/height_view.glsl has it for the pixel.
+void view_cloud_top(vec3 direction, vec4 place, vec4 light, vec2 air, INOUT(view_parts) parts)
 {
-	float top = cloud_layer.x + cloud_layer.y;
-	float from = camera_position.z <= top ? 0.0 : sphere_distance_down(camera_position.z, direction.z, top);
-	float to = sphere_distance_down(camera_position.z, direction.z, cloud_layer.x);
-	// A ray that only grazes the layer leaves it again as far behind its lowest point as it entered before it.
-	if (to < 0.0)
-		to = -2.0 * (EARTH_RADIUS + camera_position.z) * direction.z - from;
-	return from < 0.0 ? -1.0 : height_intersect(direction, from, to, camera_position.w);
-}
-
-// The cloud top met at distance t by a ray from above.
-void view_cloud_top(vec3 direction, float t, vec2 air, INOUT(view_parts) parts)
-{
+	float t = place.x;
 	float height = max(sphere_height(camera_position.z, direction.z, t), cloud_layer.x);
-	vec2 place = vec2(camera_position) + vec2(direction) * t;
-	float footprint = camera_position.w * t;
 	float mu_sun = view_sun_cosine(direction, t, height);
 	float cos_view = min(sphere_cosine(camera_position.z, direction.z, t, height), -0.01);
-	view_point p = view_point_at(direction, place, footprint, cos_view, mu_sun);
-	vec3 normal = height_normal(place, footprint);
+	view_point p = view_point_at(direction, place.z, place.w, cos_view, mu_sun);
+	vec3 normal = normalize(vec3(-light.x, -light.y, 1.0));
+	p.way = place.y;
 	// The vertical turns with the distance: facets are taken against the local one.
-	p.depth_facet = normal.z;
 	p.mu_l_facet = dot(normal, vec3(sun_direction)) + (mu_sun - sun_direction.z) * normal.z;
 	p.mu_v_facet = -dot(normal, direction) + (p.mu_v + direction.z) * normal.z;
+	p.lit = light.z;
+	p.received = light.w;
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
+	vec2 below = vec2(camera_position) + vec2(direction) * t;
 	view_layer_sunlight(p, to_layer * sun_irradiance(height, mu_sun), parts);
-	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud), to_layer * vec3(textureLod(cloud_received, place / cloud_layer.z, 0.0)), parts);
+	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud), to_layer * vec3(textureLod(cloud_received, below / cloud_layer.z, 0.0)), parts);
 	parts.distance = t;
 }
 #endif
@@ -331,10 +351,14 @@ void view_add_ground(vec3 direction, vec2 air, INOUT(view_parts) parts)
 	float t = max(sphere_distance_down(camera_position.z, min(direction.z, sphere_horizon(camera_position.z) - 1e-7), 0.0), 0.0);
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float mu_v = max(-sphere_cosine(camera_position.z, direction.z, t, 0.0), 0.002);
-	float footprint = camera_position.w * t * inversesqrt(mu_v);
-	float mu_sun = view_sun_cosine(direction, t, 0.0);
+	ground_point point;
+	point.offset = vec2(direction) * t;
+	point.across = camera_position.w * t;
+	point.mu_v = mu_v;
+	point.mu_sun = view_sun_cosine(direction, t, 0.0);
 	vec3 to_end = vec3(textureLod(air_to_end, air, 0.0));
-	parts.ground = view_ground(place, footprint, mu_sun) * to_end * parts.transmittance;
+	if (parts.transmittance.y > 1e-5)
+		parts.ground = view_ground(place, point) * to_end * parts.transmittance;
 	vec3 total = vec3(textureLod(sky_total, air, 0.0));
 #if VIEW_ABOVE
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
@@ -349,12 +373,12 @@ void view_add_ground(vec3 direction, vec2 air, INOUT(view_parts) parts)
 
 #if !VIEW_CLOUDS || VIEW_ABOVE
 // What lies above the horizon where no layer is between, or behind the cloud top that `parts` holds.
-void view_add_sky(vec3 direction, vec2 air, INOUT(view_parts) parts)
+void view_add_sky(vec3 disc, vec2 air, INOUT(view_parts) parts)
 {
 	bool cloud = parts.distance > 0.0;
 	vec3 total = vec3(textureLod(sky_total, air, 0.0));
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
-	parts.sun_direct = view_sun_disc(direction) * parts.transmittance;
+	parts.sun_direct = disc * parts.transmittance;
 	parts.air = cloud ? near : vec3(0.0);
 	parts.sky = cloud ? max(total - near, vec3(0.0)) * parts.transmittance : total;
 }
@@ -362,7 +386,13 @@ void view_add_sky(vec3 direction, vec2 air, INOUT(view_parts) parts)
 
 // The whole picture. Decided when the shader is built, since software renderers execute both sides of every branch:
 // VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_SOLVED: shading; VIEW_TWILIGHT: the sun lights the base somewhere; VIEW_COLOR_ONLY: parts are not asked for; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
-view_parts view_ray(vec3 direction)
+// disc: radiance of the sun's disc in the pixel, before the layer.
+// place, light: what a ray from above sees of the layer, as shaders/passes/height_view.glsl stores it; place.x = 0: nothing.
+#if VIEW_ABOVE
+view_parts view_ray_seen(vec3 direction, vec3 disc, vec4 place, vec4 light)
+#else
+view_parts view_ray(vec3 direction, vec3 disc)
+#endif
 {
 	vec2 air = sky_table_coordinates(direction);
 	view_parts parts = view_nothing();
@@ -375,21 +405,28 @@ view_parts view_ray(vec3 direction)
 #endif
 #if VIEW_ABOVE && VIEW_REGION != 2
 	// Rays that end on the ground, or pass between the horizons of layer and ground, meet the layer first.
-	float t = view_cloud_distance(direction);
-	if (t >= 0.0)
-		view_cloud_top(direction, t, air, parts);
+	if (place.x > 0.0)
+		view_cloud_top(direction, place, light, air, parts);
 #endif
 	if (to_ground) {
 		view_add_ground(direction, air, parts);
 	} else {
 #if VIEW_CLOUDS && !VIEW_ABOVE
-		parts = view_from_below(direction, air);
+		parts = view_from_below(direction, air, disc);
 #else
-		view_add_sky(direction, air, parts);
+		view_add_sky(disc, air, parts);
 #endif
 	}
 	return parts;
 }
+
+#if VIEW_ABOVE
+// Of a ray that does not meet the layer.
+view_parts view_ray(vec3 direction, vec3 disc)
+{
+	return view_ray_seen(direction, disc, vec4(0.0), vec4(0.0));
+}
+#endif
 
 vec3 view_sum(view_parts p)
 {

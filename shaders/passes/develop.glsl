@@ -1,4 +1,4 @@
-// The develop stage: exposure, tone and sRGB encoding of a finished picture.
+// The develop stage: exposure, tone and sRGB encoding of a finished picture. DEVELOP_NEAR: for codes of 8 bits.
 #include "shaders/lib/colour.glsl"
 
 uniform sampler2D picture;
@@ -11,8 +11,10 @@ void pass(ivec2 pixel)
 		rgb = vec3(colour_filmic(rgb.x), colour_filmic(rgb.y), colour_filmic(rgb.z));
 	}
 	rgb = min(rgb, vec3(1.0));
+#if DEVELOP_NEAR
+	rgb = vec3(colour_srgb_near(rgb.x), colour_srgb_near(rgb.y), colour_srgb_near(rgb.z)) + colour_dither(pixel) / develop.w;
+#else
 	rgb = vec3(colour_srgb(rgb.x), colour_srgb(rgb.y), colour_srgb(rgb.z));
-	if (develop.w < 256.0)
-		rgb += colour_dither(pixel) / develop.w;
+#endif
 	STORE(0, vec4(clamp(rgb, 0.0, 1.0), 1.0));
 }

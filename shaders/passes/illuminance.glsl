@@ -28,11 +28,11 @@ void pass(ivec2 pixel)
 	vec2 at = vec2(fract((float(pixel.x) + 0.5) / arguments[0].x + 0.61803399 * row), (row - first + 0.5) / rows);
 	hemisphere_sample even = hemisphere_even(at, count);
 	hemisphere_sample near = hemisphere_near(at, count);
-	hemisphere_sample disc = hemisphere_disc(at);
+	hemisphere_sample disc = hemisphere_disc(at, rows);
 	vec3 direction = is_even ? even.direction : is_near ? near.direction : disc.direction;
 
-	view_parts parts = view_ray(direction);
-	vec3 diffuse = (is_even ? even.weight : near.weight) * (view_sum(parts) - parts.sun_direct);
+	view_parts parts = view_ray(direction, vec3(0.0));
+	vec3 diffuse = (is_even ? even.weight : near.weight) * view_sum(parts);
 	vec3 direct = disc.weight / count * max(sun_direction.z, 0.0) * illuminance_beam(direction, parts);
 	STORE(0, vec4(is_even || is_near ? diffuse : direct, 1.0));
 }

@@ -5,8 +5,8 @@
 #include "shaders/lib/scattering.glsl"
 #include "shaders/lib/sky_table.glsl"
 
-const int STEPS_NEAR = 20;
-const int STEPS_FAR = 32;
+const int GROUPS_NEAR = 4; // of SCATTERING_SHARE steps
+const int GROUPS_FAR = 6;
 
 // Distance to the cloud layer (its base from below, its top from above), negative when the ray does not reach it.
 float layer_distance(float h, float mu, float to_ground)
@@ -33,18 +33,17 @@ void pass(ivec2 pixel)
 	float layer = layer_distance(h, mu, to_ground);
 	float split = layer >= 0.0 ? min(layer, end) : end;
 
-	airlight light;
-	light.radiance = vec3(0.0);
-	light.transmittance = vec3(1.0);
-	light = scattering_walk(light, h, mu, mu_sun, cos_angle, 0.0, split, split < end ? STEPS_NEAR : STEPS_NEAR + STEPS_FAR);
+	airlight light = airlight_start();
+	light = scattering_walk(light, h, mu, mu_sun, cos_angle, 0.0, split, split < end ? GROUPS_NEAR : GROUPS_NEAR + GROUPS_FAR);
 	airlight near_light = light;
 	if (split < end)
-		light = scattering_walk(light, h, mu, mu_sun, cos_angle, split, end, STEPS_FAR);
+		light = scattering_walk(light, h, mu, mu_sun, cos_angle, split, end, GROUPS_FAR);
+	vec3 near_transmittance = exp(-near_light.thickness);
 	STORE(0, vec4(light.radiance, 1.0));
 	STORE(1, vec4(near_light.radiance, 1.0));
-	STORE(2, vec4(near_light.transmittance, 1.0));
+	STORE(2, vec4(near_transmittance, 1.0));
 	float height = cloud_layer.x + cloud_layer.y;
 	float mu_layer = clamp((mu_sun * (EARTH_RADIUS + h) + split * cos_angle) / (EARTH_RADIUS + cloud_layer.x), -1.0, 1.0);
-	vec3 sunlight = sun_irradiance(mu_layer > 0.0 ? height : cloud_layer.x, mu_layer) * near_light.transmittance;
-	STORE(3, vec4(below ? light.transmittance : sunlight, 1.0));
+	vec3 sunlight = sun_irradiance(mu_layer > 0.0 ? height : cloud_layer.x, mu_layer) * near_transmittance;
+	STORE(3, vec4(below ? exp(-light.thickness) : sunlight, 1.0));
 }

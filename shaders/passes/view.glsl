@@ -3,6 +3,11 @@
 #include "shaders/lib/view.glsl"
 #include "shaders/lib/colour.glsl"
 
+#ifndef __cplusplus
+uniform sampler2D seen_place;
+uniform sampler2D seen_light;
+#endif
+
 void view_show_paths(INOUT(view_parts) p)
 {
 	p.sun_direct *= arguments[1].x;
@@ -39,14 +44,21 @@ vec3 view_layer(view_parts p, int layer)
 
 void pass(ivec2 pixel)
 {
-	view_parts parts = view_ray(camera_ray(vec2(pixel) + 0.5));
+	vec2 at = vec2(pixel) + 0.5;
+	vec3 disc = vec3(sun_at_camera) * sun_disc_share(pixel);
+#if VIEW_ABOVE
+	view_parts parts = view_ray_seen(camera_ray(at), disc, texelFetch(seen_place, pixel, 0), texelFetch(seen_light, pixel, 0));
+#else
+	view_parts parts = view_ray(camera_ray(at), disc);
+#endif
+	float shown = camera_shows(at) ? 1.0 : 0.0;
 #if VIEW_COLOR_ONLY
-	STORE(0, vec4(colour_of_bands(view_sum(parts)), 1.0));
+	STORE(0, vec4(shown * colour_of_bands(view_sum(parts)), 1.0));
 #else
 	view_show_paths(parts);
-	STORE(0, vec4(view_layer(parts, int(arguments[0].x)), 1.0));
-	STORE(1, vec4(view_layer(parts, int(arguments[0].y)), 1.0));
-	STORE(2, vec4(view_layer(parts, int(arguments[0].z)), 1.0));
-	STORE(3, vec4(view_layer(parts, int(arguments[0].w)), 1.0));
+	STORE(0, vec4(shown * view_layer(parts, int(arguments[0].x)), 1.0));
+	STORE(1, vec4(shown * view_layer(parts, int(arguments[0].y)), 1.0));
+	STORE(2, vec4(shown * view_layer(parts, int(arguments[0].z)), 1.0));
+	STORE(3, vec4(shown * view_layer(parts, int(arguments[0].w)), 1.0));
 #endif
 }

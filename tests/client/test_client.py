@@ -41,13 +41,32 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def do_GET(self):
         self.server.seen.append(self)
-        if self.path == "/v1/presets":
+        if self.path.startswith("/v1/assets"):
+            self.server.reply(self)
+        elif self.path == "/v1/presets":
             self.answer(200, "application/json", json.dumps({"presets": PRESETS}).encode())
         else:
             self.answer(self.server.health, "text/plain", b"words\n")
 
     def do_POST(self):
         self.body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        self.server.seen.append(self)
+        self.server.reply(self)
+
+
+    def do_PUT(self):
+        if "Content-Length" in self.headers:
+            self.body = self.rfile.read(int(self.headers["Content-Length"]))
+        else:
+            self.body = b""
+            while size := int(self.rfile.readline(), 16):
+                self.body += self.rfile.read(size)
+                self.rfile.readline()
+            self.rfile.readline()
+        self.server.seen.append(self)
+        self.server.reply(self)
+
+    def do_DELETE(self):
         self.server.seen.append(self)
         self.server.reply(self)
 
@@ -248,7 +267,10 @@ def test_new_file_obeys_umask(server, tmp_path):
 @pytest.mark.parametrize(
     "arguments",
     [[], ["paint"], ["render"], ["render", "a.json", "b.json", "-o", "c.png"], ["render", "--what"], ["render", "/nonexistent.json", "-o", "c.png"],
-     ["render", "a.json", "--preset", "noon", "-o", "c.png"], ["presets", "a", "b"]],
+     ["render", "a.json", "--preset", "noon", "-o", "c.png"], ["presets", "a", "b"], ["asset"], ["asset", "paint"], ["asset", "put"], ["asset", "put", "a"],
+     ["asset", "put", "a", "/nonexistent.png"], ["asset", "put", "a", "/"], ["asset", "put", "a/b", "/dev/null"], ["asset", "get", "a"],
+     ["asset", "get", "../a", "-o", "b"], ["asset", "delete"], ["asset", "delete", "a", "b"], ["asset", "delete", ".a"], ["asset", "list", "a"],
+     ["asset", "put", "a" * 64, "/dev/null"], ["asset", "delete", "a", "-o", "b"], ["asset", "get", "a", "-o", "b", "--new"]],
 )  # fmt: skip
 def test_bad_usage(server, arguments):
     done = stratus(server, *arguments)
@@ -276,3 +298,61 @@ def test_health(server):
     done = stratus(server, "health", "--ready", "-q")
     assert done.returncode == 1 and done.stdout == b"" and server.seen[-1].path == "/readyz"
     assert stratus(None, "health").returncode == 3
+
+
+ASSETS = [
+    {"name": "hills.png", "content_type": "image/png", "bytes": 1234, "width": 30, "height": 20},
+    {"name": "sea", "content_type": "image/x-exr", "bytes": 99, "width": 8192, "height": 1},
+]
+
+
+def test_asset_put(server, tmp_path):
+    data = bytes(range(256)) * 9000  # more than one buffer, and enough for an expectation of 100
+    (tmp_path / "map").write_bytes(data)
+    server.reply = lambda handler: handler.answer(201, "text/plain", b"")
+    done = stratus(server, "asset", "put", "hills.png", tmp_path / "map")
+    assert done.returncode == 0 and done.stdout == b"", done.stderr
+    assert b"hills.png" in done.stderr
+    assert server.seen[0].command == "PUT" and server.seen[0].path == "/v1/assets/hills.png"
+    assert server.seen[0].body == data and "If-None-Match" not in server.seen[0].headers
+    done = stratus(server, "asset", "put", "-q", "--new", "a-b_C.9", "-", input=b"abc")
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+    assert server.seen[1].path == "/v1/assets/a-b_C.9" and server.seen[1].body == b"abc"
+    assert server.seen[1].headers["If-None-Match"] == "*"
+
+
+def test_asset_put_refused(server, tmp_path):
+    (tmp_path / "map").write_bytes(b"abc")
+    server.reply = problem
+    done = stratus(server, "asset", "put", "a", tmp_path / "map")
+    assert done.returncode == 1 and b"422 The scene is refused" in done.stderr
+    assert stratus(None, "asset", "put", "a", tmp_path / "map").returncode == 3
+
+
+def test_asset_list(server):
+    server.reply = lambda handler: handler.answer(200, "application/json", json.dumps({"assets": ASSETS}).encode())
+    lines = [line.split() for line in stratus(server, "asset", "list").stdout.decode().splitlines()]
+    assert lines == [["hills.png", "image/png", "30", "x", "20", "1234"], ["sea", "image/x-exr", "8192", "x", "1", "99"]]
+    assert stratus(server, "asset", "list", "-q").stdout == b"hills.png\nsea\n"
+    server.reply = lambda handler: handler.answer(200, "application/json", b"[]")
+    assert stratus(server, "asset", "list").returncode == 1
+
+
+def test_asset_get(server, tmp_path):
+    server.reply = image
+    assert stratus(server, "asset", "get", "a", "-o", tmp_path / "a.png").returncode == 0
+    assert (tmp_path / "a.png").read_bytes() == IMAGE
+    assert stratus(server, "asset", "get", "a", "-o", "-").stdout == IMAGE
+    assert stratus(server, "asset", "get", "a", "-o", "/dev/full").returncode == 4
+    server.reply = problem
+    assert stratus(server, "asset", "get", "a", "-o", tmp_path / "b.png").returncode == 1
+    assert os.listdir(tmp_path) == ["a.png"]
+
+
+def test_asset_delete(server):
+    server.reply = lambda handler: handler.answer(204, "text/plain", b"")
+    assert stratus(server, "asset", "delete", "a").returncode == 0
+    assert (server.seen[0].command, server.seen[0].path) == ("DELETE", "/v1/assets/a")
+    server.reply = problem
+    assert stratus(server, "asset", "delete", "a").returncode == 1
+    assert b"put NAME FILE" in stratus(server, "asset", "--help").stdout

@@ -147,9 +147,39 @@ def test_world_to_camera(samples):
     assert numpy.linalg.det(matrix[:3, :3]) == pytest.approx(-1, abs=1e-5)  # left-handed, from a right-handed world
 
 
+def test_world_to_picture(samples):
+    """Where points appear: the middle ahead, and half the vertical field of view of 60 degrees above it at the upper edge."""
+    matrix = numpy.array(read(samples / "auto-zip.exr", "float")[0].getattribute("worldToNDC")).reshape(4, 4)
+    azimuth, elevation, roll = numpy.radians([140, 20, 30])
+    ahead = numpy.array([math.sin(azimuth) * math.cos(elevation), math.cos(azimuth) * math.cos(elevation), math.sin(elevation)])
+    level_up = numpy.array([-math.sin(azimuth) * math.sin(elevation), -math.cos(azimuth) * math.sin(elevation), math.cos(elevation)])
+    level_right = numpy.array([math.cos(azimuth), -math.sin(azimuth), 0])
+    up = math.cos(roll) * level_up - math.sin(roll) * level_right
+    right = math.cos(roll) * level_right + math.sin(roll) * level_up
+
+    def picture(direction):
+        east, north, height = 50 * direction + [100, 0, 2]
+        point = numpy.array([east, height, -north, 1]) @ matrix
+        return point[:2] / point[3]
+
+    half = math.tan(math.radians(30))
+    assert picture(ahead) == pytest.approx([0.5, 0.5], abs=1e-5)
+    assert picture(ahead + half * up) == pytest.approx([0.5, 0], abs=1e-5)
+    assert picture(ahead + half * WIDTH / HEIGHT * right) == pytest.approx([1, 0.5], abs=1e-5)
+
+
 @pytest.mark.parametrize("name, meaning", [("equirectangular", "LatLong Environment"), ("cubemap", "CubeFace Environment"), ("fisheye", None)])
 def test_panoramas(samples, name, meaning):
     spec, _ = read(samples / f"{name}.exr", "float")
     assert spec.getattribute("textureformat") == meaning
-    assert spec.getattribute("worldToCamera") is None
+    assert spec.getattribute("worldToCamera") is None and spec.getattribute("worldToNDC") is None
     assert spec.tile_width == 0
+
+
+def test_a_face_is_a_camera(samples):
+    """Face +Z looks south with west on the right: camera space has x = -X, y = Y, z = Z of the file's world."""
+    spec, _ = read(samples / "face.exr", "float")
+    assert spec.getattribute("textureformat") is None
+    matrix = numpy.array(spec.getattribute("worldToCamera")).reshape(4, 4)
+    assert matrix[:3, :3] == pytest.approx(numpy.diag([-1, 1, 1]))
+    assert spec.getattribute("screenWindowWidth") == pytest.approx(2 * WIDTH / HEIGHT)

@@ -8,6 +8,10 @@ import yaml
 from conftest import query_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+# 2 x 1 pixels, black and white.
+PNG = bytes.fromhex(
+    "89504e470d0a1a0a0000000d4948445200000002000000010800000000d14920560000000b49444154789c6360f80f000102010042bebc680000000049454e44ae426082"
+)
 CONTRACT = yaml.safe_load((ROOT / "openapi.yaml").read_text())
 SECTIONS = CONTRACT["components"]["schemas"]["Scene"]["properties"]
 MEMBERS = [(section, name, schema) for section, inner in SECTIONS.items() for name, schema in inner["properties"].items()]
@@ -23,6 +27,7 @@ BESIDE = {
     ("ground", "albedo"): {"ground": {"type": "lambert"}},
     ("output", "layers"): {"output": {"format": "exr"}},
     ("camera", "position_m"): {"clouds": {"type": "none"}},
+    ("camera", "face"): {"camera": {"projection": "cubemap"}},
 }
 # On these bounds another rule speaks: the sun below the horizon, the range of the effective radius.
 ELSEWHERE = {("sun", "latitude_deg"), ("sun", "longitude_deg"), ("dsd", "characteristic_radius_um")}
@@ -154,16 +159,32 @@ def assert_conforms(value, schema, place=""):
 
 
 EXAMPLES = {
+    "/v1/assets/{name}": "/v1/assets/example",
     "/v1/slab": "/v1/slab?optical_thickness=8&sun_zenith_deg=60",
     "/v1/sun": "/v1/sun?time=2024-06-21T12:00:00Z&latitude_deg=48&longitude_deg=11",
     "/v1/render": "/v1/render?output.width=16&output.height=16",
 }
 
 
-@pytest.mark.parametrize("path, method", [(path, method) for path, item in CONTRACT["paths"].items() for method in item])
-def test_every_call_answers(daemon, path, method):
+METHODS = ("get", "head", "post", "put", "delete")
+
+
+@pytest.fixture
+def example_asset(daemon):
+    assert daemon.request("PUT", "/v1/assets/example", PNG).status in (201, 204)
+    yield
+    daemon.request("DELETE", "/v1/assets/example")
+
+
+@pytest.mark.parametrize("path, method", [(path, method) for path, item in CONTRACT["paths"].items() for method in item if method in METHODS])
+def test_every_call_answers(daemon, example_asset, path, method):
     described = CONTRACT["paths"][path][method]["responses"]
     target = EXAMPLES.get(path, path)
+    if method in ("put", "delete"):
+        answer = daemon.request(method.upper(), target, PNG if method == "put" else None)
+        assert answer.status == 204
+        assert all(answer.headers[header] for header in described["204"].get("headers", {}))
+        return
     if method == "post":
         answer = daemon.render({"output": {"width": 16, "height": 16}})
     else:
@@ -241,6 +262,28 @@ def test_slab_parameters(daemon, name, schema):
     if "default" in schema:
         plain = daemon.head("/v1/slab?" + "&".join(f"{n}={v}" for n, v in needed.items())).headers["ETag"]
         assert check(schema["default"]) == (200, plain)
+
+
+def test_sky_answer_conforms(daemon):
+    answer = daemon.get("/v1/sky").json
+    assert_conforms(answer, {"$ref": "#/components/schemas/Sky"})
+    assert names_of(answer) == names_in({"$ref": "#/components/schemas/Sky"})
+
+
+@pytest.mark.parametrize("name", ["SkyViewZeniths", "SkyAzimuths"])
+def test_sky_parameters(daemon, name):
+    """Ranges, lengths and defaults as described."""
+    parameter = CONTRACT["components"]["parameters"][name]
+    schema, item = parameter["schema"], parameter["schema"]["items"]
+
+    def check(values):
+        answer = daemon.head(f"/v1/sky?{parameter['name']}={','.join(map(str, values))}")
+        return answer.status, answer.headers["ETag"]
+
+    assert check([item["minimum"], item["maximum"]])[0] == 200
+    assert check([item["maximum"] + 1e-6])[0] == check([item["minimum"] - 1e-6])[0] == 422
+    assert check([0] * schema["maxItems"])[0] == 200 and check([0] * (schema["maxItems"] + 1))[0] == 422
+    assert check(schema["default"]) == (200, daemon.head("/v1/sky").headers["ETag"])
 
 
 def test_served_contract_is_the_file(daemon):

@@ -100,6 +100,10 @@ def run(*flags, **environment):
         ["--workers=-1"],
         ["--droplets-mb", "0"],
         ["--droplets-disk-mb=-1"],
+        ["--asset-max-mb", "0"],
+        ["--asset-count=-1"],
+        ["--assets-disk-mb=all"],
+        ["--assets-mb", "0"],
         ["stray"],
     ],
 )
@@ -127,7 +131,7 @@ def test_settings_are_printed():
 
 def test_help_and_version():
     text = run("--help").stdout
-    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb droplets-mb droplets-disk-mb log-level".split():
+    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb droplets-mb droplets-disk-mb asset-max-mb asset-count assets-disk-mb assets-mb log-level".split():
         assert "--" + flag in text and "STRATUS_" + flag.upper().replace("-", "_") in text
     assert run("--version").stdout.startswith("stratus ")
 

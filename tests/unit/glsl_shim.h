@@ -151,11 +151,16 @@ inline vec4 textureLod(const sampler3D &sampler, vec3 at, float)
 }
 
 /* Samplers of the library. */
-static sampler2D field_coarse, field_detail, ground_map, ground_relief, height_table, height_maximum, smooth_table;
+static sampler2D field_coarse, field_detail, ground_map, sea_sky, height_table, height_light, height_start, smooth_table;
+static sampler2D height_below, shadow_below, shadow_table, received_table;
 static sampler2D probes, phase_table, event_table, slab_table;
 static sampler3D slab_slices;
-static sampler2D transmittance_table, multiscatter_table, sky_total, sky_near, air_to_layer, air_to_end;
-static sampler2D ground_received, cloud_received;
+static sampler2D transmittance_table, sky_total, sky_near, air_to_layer, air_to_end;
+static sampler2D ground_received, cloud_received, ground_irradiance, seen_place, seen_light;
+static sampler2D diffuse_0, diffuse_1, diffuse_2, diffuse_3, diffuse_4, diffuse_5, diffuse_6, diffuse_7;
+
+/* The sun's disc, of the box in the block's member sun_disc_box. */
+static std::vector<float> sun_disc_weights;
 
 /* Arguments of the pass, and what it stores. */
 static vec4 arguments[4], stored[8];
@@ -178,6 +183,7 @@ static vec4 arguments[4], stored[8];
 	X(camera_up)                                                                                                                       \
 	X(camera_forward)                                                                                                                  \
 	X(image_size)                                                                                                                      \
+	X(sun_disc_box)                                                                                                                    \
 	X(cloud_layer)                                                                                                                     \
 	X(cloud_field)                                                                                                                     \
 	X(cloud_drift)                                                                                                                     \
@@ -195,14 +201,18 @@ static vec4 arguments[4], stored[8];
 	X(band_red)                                                                                                                        \
 	X(band_green)                                                                                                                      \
 	X(band_blue)                                                                                                                       \
-	X(develop)
+	X(develop)                                                                                                                         \
+	X(sea_state)
 
 #define GLSL_MEMBER(name) static vec4 name;
 GLSL_BLOCK(GLSL_MEMBER)
 #undef GLSL_MEMBER
 
 #define GLSL_COUNT(name) +1
-static_assert(sizeof(scene_block) == 16 * (0 GLSL_BLOCK(GLSL_COUNT)), "the scene block has other members than GLSL_BLOCK");
+/* And an array of them. */
+static vec4 sea_waves[SEA_WAVES];
+
+static_assert(sizeof(scene_block) == 16 * (SEA_WAVES GLSL_BLOCK(GLSL_COUNT)), "the scene block has other members than GLSL_BLOCK");
 #undef GLSL_COUNT
 
 /* Copies the block to the globals, as an upload of the uniform buffer does. */
@@ -211,6 +221,7 @@ inline void set_scene_block(const scene_block &block)
 #define GLSL_COPY(name) std::memcpy(&name, block.name, sizeof name);
 	GLSL_BLOCK(GLSL_COPY)
 #undef GLSL_COPY
+	std::memcpy(sea_waves, block.sea_waves, sizeof sea_waves);
 }
 } // namespace glsl
 

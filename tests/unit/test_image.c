@@ -163,6 +163,12 @@ static void test_exr_panoramas(void **state)
 		encode_and_repeat(name, &frame, &scene);
 		free(frame.pixels);
 	}
+	struct frame frame = sample_frame(PIXEL_F32, 1, color);
+	struct scene scene = sample_scene(IMAGE_EXR);
+	scene.camera.projection = PROJECTION_CUBEMAP;
+	scene.camera.face = FACE_POS_Z;
+	encode_and_repeat("face.exr", &frame, &scene);
+	free(frame.pixels);
 }
 
 static void test_png_refusals(void **state)

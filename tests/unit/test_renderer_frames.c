@@ -58,14 +58,28 @@ static double spread(double low, double high)
 	return exp(uniform(log(low), log(high)));
 }
 
+/* Half of the pictures are panoramas. */
+static void choose_projection(struct scene *scene)
+{
+	scene->camera.projection = one_of(2) ? PROJECTION_PERSPECTIVE : (enum projection)one_of(PROJECTION_COUNT);
+	if (scene->camera.projection == PROJECTION_CUBEMAP)
+		scene->camera.face = (enum cube_face)one_of(FACE_COUNT);
+	const struct scene_shape shape = scene_camera_shape(&scene->camera);
+	if (shape.ratio[0])
+		scene->output.width = 16 * shape.ratio[0], scene->output.height = 16 * shape.ratio[1];
+	if (shape.ratio[0] == shape.ratio[1] && shape.ratio[0])
+		scene->output.width = scene->output.height = 40;
+}
+
 static struct scene random_scene(void)
 {
-	static const enum cloud_type types[] = {CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_NONE};
-	static const enum ground_type grounds[] = {GROUND_COUNTRY, GROUND_SEA, GROUND_SEA_ICE, GROUND_SNOW, GROUND_BLACK, GROUND_LAMBERT};
+	static const enum cloud_type types[] = {CLOUD_STRATUS, CLOUD_STRATOCUMULUS, CLOUD_ALTOCUMULUS, CLOUD_CIRROCUMULUS, CLOUD_NONE};
+	static const enum ground_type grounds[] = {GROUND_GRASS,   GROUND_COUNTRY, GROUND_SOIL,  GROUND_SAND,   GROUND_SEA,
+						   GROUND_SEA_ICE, GROUND_SNOW,    GROUND_BLACK, GROUND_LAMBERT};
 	struct scene scene = small_scene(64, 48, (1u << LAYER_COUNT) - 1);
 	scene.sun = (struct scene_sun){.elevation_deg = uniform(-18, 90), .azimuth_deg = uniform(0, 360)};
 	scene.dsd = (struct scene_dsd){spread(1, 5000), spread(1, 20), spread(1, 30)};
-	scene.clouds.type = types[one_of(8) % 3];
+	scene.clouds.type = types[one_of(9) % 5];
 	scene.clouds.seed = (uint32_t)uniform(0, 4294967295.0);
 	scene.clouds.time_s = uniform(0, 1) < 0.5 ? 0 : spread(1, 1e7);
 	scene.clouds.coverage = one_of(4) == 0 ? one_of(2) : uniform(0, 1);
@@ -75,7 +89,7 @@ static struct scene random_scene(void)
 	scene.clouds.resolution = 64 << one_of(4);
 	scene.clouds.wind_mps[0] = uniform(-100, 100);
 	scene.clouds.wind_mps[1] = uniform(-100, 100);
-	scene.ground.type = grounds[one_of(6)];
+	scene.ground.type = grounds[one_of(sizeof grounds / sizeof *grounds)];
 	for (int i = 0; i < 3; i++)
 		scene.ground.albedo[i] = uniform(0, 1);
 	scene.atmosphere = (struct scene_atmosphere){uniform(0, 2), uniform(0, 600)};
@@ -88,6 +102,7 @@ static struct scene random_scene(void)
 	scene.camera.vertical_fov_deg = spread(0.5, 150);
 	scene.radiosity.enabled = one_of(4) != 0;
 	scene.radiosity.tolerance = spread(1e-4, 1);
+	choose_projection(&scene);
 	return scene;
 }
 
@@ -144,8 +159,13 @@ static void random_scenes_are_sane(void **state)
 {
 	(void)state;
 	for (int i = 0; i < 40; i++) {
-		const struct scene scene = random_scene();
+		struct scene scene = random_scene();
 		struct frame frame = render(&scene);
+		check_values(i, &frame);
+		frame_finish(&frame);
+		/* By programs of its own. */
+		scene.output.layers = LAYER(COLOR);
+		frame = render(&scene);
 		check_values(i, &frame);
 		frame_finish(&frame);
 	}

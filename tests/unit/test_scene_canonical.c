@@ -66,6 +66,8 @@ static json_t *random_value(const struct scene_field *field)
 		return json_string(field->choices[choice]);
 	case FIELD_INTEGER:
 		return json_real(field->flags & FIELD_POWER_OF_TWO ? field->range[0].high : floor(random_in(&field->range[0])));
+	case FIELD_ASSET:
+		return json_string("some-map_1.png");
 	case FIELD_SEED:
 		return json_real(floor(random_in(&field->range[0])));
 	case FIELD_NUMBER_OR_AUTO:
@@ -75,16 +77,38 @@ static json_t *random_value(const struct scene_field *field)
 	}
 }
 
+/* Members that most panoramas, or most other pictures, are refused with. */
+static bool is_out_of_place(const struct scene_field *field, bool panorama)
+{
+	static const char *const of_perspectives[] = {"azimuth_deg", "elevation_deg", "roll_deg", "vertical_fov_deg", "height", NULL};
+	if (strcmp(field->section, "camera") != 0 && strcmp(field->section, "output") != 0)
+		return false;
+	if (strcmp(field->name, "projection") == 0 || strcmp(field->name, "face") == 0)
+		return !panorama;
+	return panorama && name_index(of_perspectives, field->name) >= 0;
+}
+
+/* Whether a field is for scenes with a map, for those without, or for both. A hash is a query's no member, and so left out here. */
+static bool suits(const struct scene_field *field, bool map)
+{
+	static const char *const procedural[] = {"type", "seed", "coverage", "albedo", NULL};
+	const bool either = strcmp(field->section, "clouds") == 0 || strcmp(field->section, "ground") == 0;
+	if (field->type == FIELD_HASH)
+		return false;
+	return field->type == FIELD_ASSET ? map : !(map && either && name_index(procedural, field->name) >= 0);
+}
+
 /* A random scene that obeys the rules across members; the others are thrown away. */
 static bool random_scene(struct scene *scene)
 {
 	struct scene_input input = scene_input_default();
 	struct problem problem = {0};
-	const bool by_time = random_bits() & 1;
+	const bool panorama = random_bits() & 1, map = random_bits() % 4 == 0, by_time = random_bits() & 1;
 	for (const struct scene_field *field = scene_fields; field->section; field++) {
 		const bool of_sun = strcmp(field->section, "sun") == 0,
 			   is_angle = strstr(field->name, "elevation") || strstr(field->name, "azimuth");
-		if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER) || (of_sun ? is_angle == by_time : random_bits() % 3 == 0))
+		const bool left_out = of_sun ? is_angle == by_time : random_bits() % 3 == 0;
+		if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER) || is_out_of_place(field, panorama) || !suits(field, map) || left_out)
 			continue;
 		json_t *value = random_value(field);
 		scene_json_read_field(field, value, "/x", &input, &problem);
@@ -130,12 +154,14 @@ static struct scene scene_of_query(const char *text)
 static void test_round_trips(void **state)
 {
 	(void)state;
-	int tried = 0;
+	int tried = 0, projections[PROJECTION_COUNT] = {0}, faces = 0;
 	for (int i = 0; i < 20000 && tried < 500; i++) {
 		struct scene scene;
 		if (!random_scene(&scene))
 			continue;
 		tried++;
+		projections[scene.camera.projection]++;
+		faces += scene.camera.face != FACE_ALL;
 		char *first = scene_canonical(&scene), *query = scene_canonical_query(&scene);
 		struct scene again = scene_of_text(first), twin = scene_of_query(query);
 		char *second = scene_canonical(&again), *third = scene_canonical(&twin);
@@ -144,6 +170,42 @@ static void test_round_trips(void **state)
 		free(first), free(query), free(second), free(third);
 	}
 	assert_int_equal(tried, 500);
+	for (int i = 0; i < PROJECTION_COUNT; i++)
+		assert_true(projections[i] > 10);
+	assert_true(faces > 10);
+}
+
+/* Members without a meaning in a projection are in no form of its scenes; its own sizes are said only where they are others. */
+static void test_panoramas(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *body, *camera, *query;
+		int width, height;
+	} cases[] = {
+		{"{\"camera\":{\"projection\":\"fisheye\"}}", "\"camera\":{\"position_m\":[0,0,2],\"projection\":\"fisheye\"},",
+		 "camera.projection=fisheye", 1024, 1024},
+		{"{\"camera\":{\"projection\":\"equirectangular\"},\"output\":{\"height\":256}}", "\"projection\":\"equirectangular\"},",
+		 "camera.projection=equirectangular&output.width=512&output.height=256", 512, 256},
+		{"{\"camera\":{\"projection\":\"cubemap\"},\"output\":{\"width\":512}}", "\"projection\":\"cubemap\"},",
+		 "camera.projection=cubemap", 512, 3072},
+		{"{\"camera\":{\"projection\":\"cubemap\",\"face\":\"+X\"}}", "\"projection\":\"cubemap\",\"face\":\"+X\"},",
+		 "camera.projection=cubemap&camera.face=+X", 512, 512},
+		{"{\"camera\":{\"projection\":\"cubemap\",\"face\":\"-Z\"},\"output\":{\"width\":64}}",
+		 "\"projection\":\"cubemap\",\"face\":\"-Z\"},",
+		 "camera.projection=cubemap&camera.face=-Z&output.width=64&output.height=64", 64, 64},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		const struct scene scene = scene_of_text(cases[i].body), twin = scene_of_query(cases[i].query);
+		char *canonical = scene_canonical(&scene), *query = scene_canonical_query(&scene), *again = scene_canonical(&twin);
+		assert_int_equal(scene.output.width, cases[i].width);
+		assert_int_equal(scene.output.height, cases[i].height);
+		assert_non_null(strstr(canonical, cases[i].camera));
+		assert_null(strstr(canonical, "roll_deg"));
+		assert_string_equal(query, cases[i].query);
+		assert_string_equal(canonical, again);
+		free(canonical), free(query), free(again);
+	}
 }
 
 static void test_default_form(void **state)
@@ -247,8 +309,8 @@ static void test_numbers(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_round_trips), cmocka_unit_test(test_default_form), cmocka_unit_test(test_time_and_place),
-		cmocka_unit_test(test_key),         cmocka_unit_test(test_numbers),
+		cmocka_unit_test(test_round_trips),    cmocka_unit_test(test_panoramas), cmocka_unit_test(test_default_form),
+		cmocka_unit_test(test_time_and_place), cmocka_unit_test(test_key),       cmocka_unit_test(test_numbers),
 	};
 	return cmocka_run_group_tests_name("scene_canonical", tests, NULL, NULL);
 }

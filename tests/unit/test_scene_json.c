@@ -147,6 +147,48 @@ static void test_across_members(void **state)
 	assert_refused("{\"output\":{\"width\":8192,\"height\":8192,\"format\":\"exr\",\"layers\":[\"sky\",\"air\"]}}", "/output");
 }
 
+static void assert_size(const char *body, int width, int height)
+{
+	assert_valid(body);
+	assert_int_equal(input.scene.output.width, width);
+	assert_int_equal(input.scene.output.height, height);
+}
+
+static void test_panoramas(void **state)
+{
+	(void)state;
+	assert_refused("{\"camera\":{\"projection\":\"fisheye\",\"roll_deg\":0}}", "/camera/roll_deg");
+	read("{\"camera\":{\"projection\":\"cubemap\",\"azimuth_deg\":0,\"elevation_deg\":0,\"roll_deg\":0,\"vertical_fov_deg\":60}}");
+	assert_int_equal(problem.error_count, 4);
+	assert_refused("{\"camera\":{\"projection\":\"mercator\"}}", "/camera/projection");
+	assert_refused("{\"camera\":{\"projection\":\"cubemap\",\"face\":\"X\"}}", "/camera/face");
+	assert_refused("{\"camera\":{\"projection\":\"equirectangular\",\"face\":\"+X\"}}", "/camera/face");
+	assert_refused("{\"camera\":{\"face\":\"+X\"}}", "/camera/face");
+
+	assert_size("{\"camera\":{\"projection\":\"fisheye\"}}", 1024, 1024);
+	assert_size("{\"camera\":{\"projection\":\"fisheye\"},\"output\":{\"height\":17}}", 17, 17);
+	assert_size("{\"camera\":{\"projection\":\"equirectangular\"}}", 2048, 1024);
+	assert_size("{\"camera\":{\"projection\":\"equirectangular\"},\"output\":{\"width\":1000}}", 1000, 500);
+	assert_size("{\"camera\":{\"projection\":\"equirectangular\"},\"output\":{\"height\":4096}}", 8192, 4096);
+	assert_size("{\"camera\":{\"projection\":\"equirectangular\"},\"output\":{\"width\":32,\"height\":16}}", 32, 16);
+	assert_size("{\"camera\":{\"projection\":\"cubemap\"}}", 512, 3072);
+	assert_size("{\"camera\":{\"projection\":\"cubemap\"},\"output\":{\"width\":1365}}", 1365, 8190);
+	assert_size("{\"camera\":{\"projection\":\"cubemap\"},\"output\":{\"height\":96}}", 16, 96);
+	assert_size("{\"camera\":{\"projection\":\"cubemap\",\"face\":\"-Y\"}}", 512, 512);
+	assert_size("{\"camera\":{\"projection\":\"cubemap\",\"face\":\"-Y\"},\"output\":{\"width\":8192}}", 8192, 8192);
+	assert_int_equal(input.scene.camera.face, FACE_NEG_Y);
+
+	assert_refused("{\"camera\":{\"projection\":\"fisheye\"},\"output\":{\"width\":64,\"height\":65}}", "/output/height");
+	assert_refused("{\"camera\":{\"projection\":\"equirectangular\"},\"output\":{\"width\":1001}}", "/output/width");
+	assert_refused("{\"camera\":{\"projection\":\"equirectangular\"},\"output\":{\"width\":30}}", "/output/width");
+	assert_refused("{\"camera\":{\"projection\":\"equirectangular\"},\"output\":{\"height\":4097}}", "/output/height");
+	assert_refused("{\"camera\":{\"projection\":\"equirectangular\"},\"output\":{\"width\":512,\"height\":512}}", "/output/height");
+	assert_refused("{\"camera\":{\"projection\":\"cubemap\"},\"output\":{\"width\":1366}}", "/output/width");
+	assert_refused("{\"camera\":{\"projection\":\"cubemap\"},\"output\":{\"height\":3000,\"width\":512}}", "/output/height");
+	assert_refused("{\"camera\":{\"projection\":\"cubemap\"},\"output\":{\"height\":3001}}", "/output/height");
+	assert_refused("{\"camera\":{\"projection\":\"cubemap\"},\"output\":{\"height\":8}}", "/output/height");
+}
+
 static void test_sun_by_time(void **state)
 {
 	(void)state;
@@ -172,20 +214,38 @@ static void assert_later(const char *body, const char *pointer)
 static void test_later(void **state)
 {
 	(void)state;
-	assert_later("{\"clouds\":{\"type\":\"altocumulus\"}}", "/clouds/type");
-	assert_later("{\"clouds\":{\"type\":\"cirrocumulus\"}}", "/clouds/type");
-	assert_later("{\"clouds\":{\"map\":\"a\"}}", "/clouds/map");
-	assert_later("{\"ground\":{\"type\":\"grass\"}}", "/ground/type");
-	assert_later("{\"ground\":{\"type\":\"soil\"}}", "/ground/type");
-	assert_later("{\"ground\":{\"type\":\"sand\"}}", "/ground/type");
-	assert_later("{\"ground\":{\"map\":\"a\"}}", "/ground/map");
-	assert_later("{\"camera\":{\"projection\":\"cubemap\",\"face\":\"+X\"}}", "/camera/face");
-	assert_later("{\"camera\":{\"projection\":\"equirectangular\"}}", "/camera/projection");
+	assert_valid("{\"ground\":{\"type\":\"grass\"}}");
+	assert_valid("{\"ground\":{\"type\":\"soil\"}}");
+	assert_valid("{\"ground\":{\"type\":\"sand\"}}");
 	assert_later("{\"model\":{\"name\":\"volume\"}}", "/model/name");
-	read("{\"camera\":{\"projection\":\"fisheye\",\"roll_deg\":0}}");
-	assert_true(problem_mentions(&problem, "/camera/roll_deg"));
-	read("{\"clouds\":{\"map\":\"a\",\"seed\":3}}");
-	assert_true(problem_mentions(&problem, "/clouds/seed"));
+}
+
+static void test_maps(void **state)
+{
+	(void)state;
+	assert_valid("{\"clouds\":{\"map\":\"a.b-c_9\",\"map_hash\":\"0123456789abcdef0123456789abcdef\"},"
+		     "\"ground\":{\"map\":\"a\",\"albedo_scale\":2}}");
+	assert_string_equal(input.scene.clouds.map.name, "a.b-c_9");
+	assert_string_equal(input.scene.clouds.map.hash, "0123456789abcdef0123456789abcdef");
+	assert_string_equal(input.scene.ground.map.name, "a");
+	assert_int_equal(input.scene.ground.type, GROUND_LAMBERT);
+	static const char *const bad_names[] = {
+		"\"\"",   "\".a\"",  "\"a/b\"",
+		"\"..\"", "\"a b\"", "\"\u00e4\"",
+		"1",      "null",    "\"0123456789012345678901234567890123456789012345678901234567890123\""};
+	for (size_t i = 0; i < sizeof bad_names / sizeof *bad_names; i++) {
+		char body[128];
+		snprintf(body, sizeof body, "{\"clouds\":{\"map\":%s}}", bad_names[i]);
+		assert_refused(body, "/clouds/map");
+	}
+	assert_refused("{\"clouds\":{\"map\":\"a\",\"seed\":3}}", "/clouds/seed");
+	assert_refused("{\"clouds\":{\"map\":\"a\",\"type\":\"none\"}}", "/clouds/type");
+	assert_refused("{\"clouds\":{\"map\":\"a\",\"coverage\":0.5}}", "/clouds/coverage");
+	assert_refused("{\"clouds\":{\"map\":\"a\",\"map_hash\":\"0123\"}}", "/clouds/map_hash");
+	assert_refused("{\"clouds\":{\"map_hash\":\"0123456789abcdef0123456789abcdef\"}}", "/clouds/map_hash");
+	assert_refused("{\"ground\":{\"map\":\"a\",\"type\":\"lambert\"}}", "/ground/type");
+	assert_refused("{\"ground\":{\"map\":\"a\",\"albedo\":[0,0,0]}}", "/ground/albedo");
+	assert_refused("{\"ground\":{\"map_hash\":\"0123456789abcdef0123456789abcdef\"}}", "/ground/map_hash");
 }
 
 static void test_not_json(void **state)
@@ -277,8 +337,10 @@ int main(void)
 		cmocka_unit_test(test_repeated_and_huge),
 		cmocka_unit_test(test_all_at_once),
 		cmocka_unit_test(test_across_members),
+		cmocka_unit_test(test_panoramas),
 		cmocka_unit_test(test_sun_by_time),
 		cmocka_unit_test(test_later),
+		cmocka_unit_test(test_maps),
 		cmocka_unit_test(test_not_json),
 		cmocka_unit_test(test_nesting),
 		cmocka_unit_test(test_bounds_of_a_problem),

@@ -213,6 +213,7 @@ static void srgb_curve(void **)
 	for (int code = 0; code < 256; code++) {
 		const double v = code / 255., linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
 		assert_near(colour_srgb((float)linear) * 255, code, 1e-3);
+		assert_near(colour_srgb_near((float)linear) * 255, code, 0.01);
 	}
 }
 

@@ -66,7 +66,9 @@ static void lattices_repeat(void **)
 		/* Whole periods are added, which floats hold to 1e-6 of a cell. */
 		assert_near(noise_gradient(p, 6, 3u, 0.3f), noise_gradient(p + vec2(6, -12), 6, 3u, 0.3f), 1e-4);
 		assert_near(noise_turbulence(p / 6.f, 6, 5, 3u, 0.3f), noise_turbulence(p / 6.f + vec2(-1, 2), 6, 5, 3u, 0.3f), 2e-3);
-		assert_near(noise_cells(p, 6, 3u, 2.4f, 0.8f), noise_cells(p + vec2(-6, 6), 6, 3u, 2.4f, 0.8f), 1e-4);
+		const vec2 here = noise_centres(p, 6, 3u, 2.f, 0.4f, 0.8f), there = noise_centres(p + vec2(-6, 6), 6, 3u, 2.f, 0.4f, 0.8f);
+		assert_near(here.x, there.x, 1e-4);
+		assert_near(here.y, there.y, 1e-4);
 	}
 }
 
@@ -149,25 +151,56 @@ static void turbulence_has_a_kolmogorov_spectrum(void **)
 	assert_near(slope, -5. / 3, 0.25);
 }
 
-/* Cells: 1 at a centre, never below 0; a lattice cell without any is rare; no jump as lives begin and end. */
+/* Centres: somewhere one is near, the second is never nearer than the first, and nothing jumps as lives begin and end. */
 static void cells_live_without_jumps(void **)
 {
-	double largest = 0, jump = 0;
+	double nearest = 9, farthest = 0, jump = 0;
 	for (int i = 0; i < 4000; i++) {
 		const vec2 p(noise_unit(noise_hash((uint)i)) * 9, noise_unit(noise_hash((uint)i + 5555u)) * 9);
-		float before = 0;
+		vec2 before(0);
 		for (int step = 0; step < 40; step++) {
-			const float now = noise_cells(p, 9, 7u, (float)step * 0.002f + 3.f, 0.8f);
-			assert_true(now >= 0 && now <= 1);
-			largest = std::fmax(largest, (double)now);
+			/* Across the end of a whole life, late enough that a single number would not do. */
+			const bool next = step >= 20;
+			const vec2 now =
+				noise_centres(p, 9, 7u, next ? 400001.f : 400000.f, (float)step * 0.002f + (next ? -0.04f : 0.96f), 0.9f);
+			assert_true(now.x >= 0 && now.y >= now.x);
+			nearest = std::fmin(nearest, (double)now.x);
+			farthest = std::fmax(farthest, (double)now.x);
 			if (step > 0)
-				jump = std::fmax(jump, std::fabs((double)(now - before)));
+				jump = std::fmax(jump,
+						 std::fmax(std::fabs((double)(now.x - before.x)), std::fabs((double)(now.y - before.y))));
 			before = now;
 		}
 	}
-	assert_true(largest > 0.99);
-	/* A centre that weakens by 2 over 0.2 lives passes at most this much in a step. */
-	assert_true(jump < 0.08);
+	assert_true(nearest < 0.01 && farthest <= 1);
+	/* A centre that weakens by 1 over a quarter of its life passes at most this much in a step. */
+	assert_true(jump < 1.5 * 0.002 / 0.25 * 1.1);
+}
+
+/* Values at lattice points: mean 0, variance 1, whatever their age, and steady over the ends of lives. */
+static void values_live_without_jumps(void **)
+{
+	const int count = 20000;
+	for (float fraction : {0.f, 0.13f, 0.5f, 0.98f}) {
+		double sum = 0, squares = 0, jump = 0;
+		for (uint i = 0; i < (uint)count; i++) {
+			const uint hash = noise_hash(i);
+			const float value = noise_living(hash, 77.f, fraction);
+			const float later =
+				fraction < 0.97f ? noise_living(hash, 77.f, fraction + 0.01f) : noise_living(hash, 78.f, fraction - 0.99f);
+			sum += (double)value;
+			squares += (double)(value * value);
+			jump = std::fmax(jump, std::fabs((double)(later - value)));
+		}
+		assert_near(sum / count, 0, 0.03);
+		assert_near(squares / count, 1, 0.05);
+		assert_true(jump < 0.12);
+	}
+	/* Another life, another value. */
+	int same = 0;
+	for (uint i = 0; i < 1000; i++)
+		same += std::fabs((double)(noise_living(noise_hash(i), 5.f, 0.2f) - noise_living(noise_hash(i), 8.f, 0.2f))) < 0.02;
+	assert_true(same < 60);
 }
 
 int main()
@@ -179,6 +212,7 @@ int main()
 		cmocka_unit_test(variance_is_near_one),
 		cmocka_unit_test(turbulence_has_a_kolmogorov_spectrum),
 		cmocka_unit_test(cells_live_without_jumps),
+		cmocka_unit_test(values_live_without_jumps),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

@@ -26,9 +26,21 @@ const struct bound bounds[BOUND_COUNT] = {
 	{"R, T against photons: within max(3 standard errors, 2 %)", TALLY_PHOTON_FLUX, STATISTIC_SHARE, 0.99, 1, "%"},
 	{"radiance against photons: within max(3 standard errors, 2 %)", TALLY_PHOTON_RADIANCE, STATISTIC_SHARE, 0.99, 1, "%"},
 	{"standard error of those photons, largest", TALLY_PHOTON_ERROR, STATISTIC_WORST, 0.005, 1, "%"},
+	{"squares of light between ground and base, of the emitter's value", TALLY_SQUARES, STATISTIC_WORST, 0.02, 1, "%"},
+	{"ground under a uniform deck, pictures against the solver", TALLY_DECK_GROUND, STATISTIC_WORST, 0.05, 1, "%"},
+	{"the base of that deck likewise", TALLY_DECK_BASE, STATISTIC_WORST, 0.05, 1, "%"},
+	{"both against `ground.json`", TALLY_DECK_REFERENCE, STATISTIC_WORST, 0.05, 1, "%"},
+	{"light on the deck against what leaves it and what the ground takes", TALLY_DECK_BALANCE, STATISTIC_WORST, 0.005, 1, "%"},
+	{"sky over snow against twice that over water, 30 degrees high", TALLY_WATER_SKY, STATISTIC_WORST, 0.3, 1, "%"},
 	{"new droplets, cold, two threads", TALLY_COLD, STATISTIC_WORST, 250, 2, "ms"},
 	{"the same droplets from disk", TALLY_DISK, STATISTIC_WORST, 10, 2, "ms"},
 	{"the same droplets from memory", TALLY_MEMORY, STATISTIC_WORST, 0.1, 2, "ms"},
+	{"clear sky against `sky.json`, to 75 degrees", TALLY_SKY_ABSOLUTE, STATISTIC_WORST, 0.15, 1, "%"},
+	{"the same over the zenith's", TALLY_SKY_RELATIVE, STATISTIC_WORST, 0.10, 1, "%"},
+	{"hazy skies against photons, beyond 3 standard errors", TALLY_SKY_PHOTONS, STATISTIC_WORST, 0.15, 1, "%"},
+	{"the same over the zenith's", TALLY_SKY_PHOTONS_RELATIVE, STATISTIC_WORST, 0.10, 1, "%"},
+	{"colour of sun and sky, three bands against a spectrum, in x, y", TALLY_SKY_COLOUR, STATISTIC_WORST, 0.02, 1, ""},
+	{"luminance likewise", TALLY_SKY_LUMINANCE, STATISTIC_WORST, 0.12, 1, "%"},
 };
 
 void tally_add(struct tally *tally, double error, const char *format, ...)

@@ -30,9 +30,21 @@ enum tally_id {
 	TALLY_PHOTON_FLUX, /* over what is allowed */
 	TALLY_PHOTON_RADIANCE,
 	TALLY_PHOTON_ERROR, /* standard errors of what was judged */
-	TALLY_COLD,         /* ms: least of several, of one distribution */
+	TALLY_SQUARES,      /* absolute, over the emitter's value */
+	TALLY_DECK_GROUND,  /* relative, these four */
+	TALLY_DECK_BASE,
+	TALLY_DECK_REFERENCE,
+	TALLY_DECK_BALANCE,
+	TALLY_WATER_SKY, /* relative */
+	TALLY_COLD,      /* ms: least of several, of one distribution */
 	TALLY_DISK,
 	TALLY_MEMORY,
+	TALLY_SKY_ABSOLUTE, /* clear sky, relative: against discrete ordinates; of photons what their error does not explain */
+	TALLY_SKY_RELATIVE,
+	TALLY_SKY_PHOTONS,
+	TALLY_SKY_PHOTONS_RELATIVE,
+	TALLY_SKY_COLOUR, /* distance of chromaticities x, y */
+	TALLY_SKY_LUMINANCE,
 	TALLY_COUNT
 };
 
@@ -61,7 +73,7 @@ struct bound {
 	const char *unit; /* "%" shows it times 100 */
 };
 
-enum { BOUND_COUNT = 25 };
+enum { BOUND_COUNT = 37 };
 extern const struct bound bounds[BOUND_COUNT];
 
 enum verdict { VERDICT_REACHED, VERDICT_TOLERATED, VERDICT_BROKEN };

@@ -1,4 +1,4 @@
-# Draws figure{4,6,8,9}.svg: gnuplot -e "data='FOLDER'; out='FOLDER'" figures.gp; with png=1 as PNG.
+# Draws figure{4,6,8,9}.svg and passes.svg: gnuplot -e "data='FOLDER'; out='FOLDER'" figures.gp; with png=1 as PNG.
 # Colours after M. Okabe and K. Ito, which the colour-blind tell apart; an order of scattering has the same one everywhere.
 if (!exists("png")) png = 0
 svg = "svg size 800,%d font 'sans-serif,13' background 'white'"
@@ -134,3 +134,19 @@ do for [side = 0:1] { do for [number = 0:1] {
 		"" using 1:(column(2 + 2*side)) with points pt 7 ps 0.45 lc rgb red title (other_key ? "photons" : "")
 } }
 unset multiplot
+
+# --- passes of the exchange -----------------------------------------------------------------------------------------------------------
+reset
+set datafile separator "\t"
+eval axes
+eval start("passes", 360)
+set key outside right center vertical Left reverse samplen 2
+set logscale y; set format y "10^{%L}"
+set xrange [0.8:8.2]; set xtics 1
+set yrange [1e-7:1]
+set xlabel "passes"
+set ylabel "residual"
+set arrow 1 from 0.8,1e-3 to 8.2,1e-3 nohead lc rgb grey dt 2
+set label 1 "default tolerance" at 8.1,1.6e-3 right textcolor rgb "#777777" font ",10"
+array curve[5] = [blue, sky, green, orange, red]
+plot for [k = 0:4] file("passes") index k using 1:2 with linespoints pt 7 ps 0.5 lw 1.6 lc rgb curve[k + 1] title columnheader(1)

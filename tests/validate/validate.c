@@ -91,8 +91,10 @@ static const struct part {
 	{"times", validate_times},     {"reference", validate_reference},
 	{"spheres", validate_spheres}, {"conservation", validate_conservation},
 	{"lookup", validate_lookup},   {"photons", validate_photons},
+	{"sky", validate_sky},         {"ground", validate_ground},
 	{"figure 4", figure_phase},    {"figure 6", figure_orders},
 	{"figure 8", figure_fluxes},   {"figure 9", figure_radiance},
+	{"passes", figure_passes},     {"water sky", figure_water_sky},
 };
 
 static double now_s(void)
@@ -122,6 +124,7 @@ static void print_head(FILE *file, const struct validation *validation)
 		      "times is the same in every run on one kind of processor.\n\n");
 	if (validation->effort != 1)
 		fprintf(file, "**A run of effort %g: too short for the bounds.**\n\n", validation->effort);
+	fprintf(file, "The clear sky has a page of its own, [sky.md](sky.md).\n\n");
 	fprintf(file, "## Bounds\n\n");
 	bounds_print(file, &validation->measured);
 	fprintf(file, "\nHow:\n\n"

@@ -56,6 +56,8 @@ void validate_spheres(struct validation *validation);      /* sums over single s
 void validate_conservation(struct validation *validation); /* R + T = 1, reciprocity */
 void validate_lookup(struct validation *validation);       /* the shader */
 void validate_photons(struct validation *validation);      /* Monte Carlo */
+void validate_ground(struct validation *validation);       /* light between ground and clouds */
+void validate_sky(struct validation *validation);          /* the clear sky; writes the page sky.md */
 void validate_times(struct validation *validation);        /* the store */
 
 /* The paper's figures: data files in the folder, text onto the page. */
@@ -63,6 +65,9 @@ void figure_phase(struct validation *validation);
 void figure_orders(struct validation *validation);
 void figure_fluxes(struct validation *validation);
 void figure_radiance(struct validation *validation);
+/* None of the paper's. */
+void figure_passes(struct validation *validation);
+void figure_water_sky(struct validation *validation);
 
 /* Opens a data file. */
 FILE *figure_file(const struct validation *validation, const char *name);

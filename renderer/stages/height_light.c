@@ -1,0 +1,119 @@
+#include "renderer/stages/height_light.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { PASS_SHADOW, PASS_RECEIVED, PASS_SOFTEN };
+
+static const struct pass_desc pass_descs[HEIGHT_LIGHT_PASS_COUNT] = {
+	[PASS_SHADOW] = {.file = "shaders/passes/height_shadow.glsl", .outputs = 1, .samplers = {"height_table", "shadow_below"}},
+	[PASS_RECEIVED] = {.file = "shaders/passes/height_received.glsl", .outputs = 1, .samplers = {"height_table", "shadow_table"}},
+	[PASS_SOFTEN] = {.file = "shaders/passes/height_soften.glsl", .outputs = 1, .samplers = {"height_table", "received_table"}},
+};
+
+/* LIGHT_SIDE and LOWEST_SUN as in shaders/lib/height_sun.glsl. */
+enum { LIGHT_SIDE = 512 };
+static const double lowest_sun = 0.035;
+
+/* Distance to the nearest place that can throw a shadow, in texels. */
+static const double first_step = 0.75;
+
+/* Light that is scattered a few times comes out again near where it went in, that scattered often after the smoothing length: the short
+ * length as a share of the long one, and its weight. */
+static const double short_length = 0.3, short_weight = 0.4;
+
+bool height_light_init(struct height_light_stage *stage, const struct pass_compiler *compiler)
+{
+	return stage_create_passes(compiler, pass_descs, stage->passes, HEIGHT_LIGHT_PASS_COUNT);
+}
+
+void height_light_finish(struct height_light_stage *stage)
+{
+	stage_destroy_passes(stage->passes, HEIGHT_LIGHT_PASS_COUNT);
+}
+
+/* Tables of one computation; `light` is what remains. */
+struct tables {
+	struct texture shadow[2], received, light;
+};
+
+static void tables_finish(struct tables *tables)
+{
+	texture_finish(&tables->shadow[0]);
+	texture_finish(&tables->shadow[1]);
+	texture_finish(&tables->received);
+	texture_finish(&tables->light);
+}
+
+static bool tables_init(struct tables *tables)
+{
+	*tables = (struct tables){0};
+	return texture_init(&tables->shadow[0], LIGHT_SIDE, LIGHT_SIDE, TEXTURE_R32F, TEXTURE_REPEAT) &&
+	       texture_init(&tables->shadow[1], LIGHT_SIDE, LIGHT_SIDE, TEXTURE_R32F, TEXTURE_REPEAT) &&
+	       texture_init(&tables->received, LIGHT_SIDE, LIGHT_SIDE, TEXTURE_RGBA32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS) &&
+	       texture_init(&tables->light, LIGHT_SIDE, LIGHT_SIDE, TEXTURE_RGBA16F, TEXTURE_REPEAT | TEXTURE_MIPMAPS);
+}
+
+/* The shadow of all that stands within the reach of the highest top; returns which of the two tables holds it. */
+static int run_shadow(const struct height_light_stage *stage, const struct scene_block *block, const struct texture *height,
+		      struct tables *tables)
+{
+	const double mu = fmin(fmax(block->sun_direction[2], lowest_sun), 0.9999), rise = mu / sqrt(1 - mu * mu);
+	const double tile = block->cloud_layer[2], reach = fmin(block->cloud_layer[1] / rise, tile);
+	double distance = first_step * tile / LIGHT_SIDE;
+	int at = 0;
+	for (bool first = true;; first = false, at = !at) {
+		struct pass_run run = {.targets = (struct texture *[]){&tables->shadow[at]},
+				       .samplers = {height, &tables->shadow[!at]},
+				       .arguments = {{(float)(distance / tile), (float)(distance * rise), first}}};
+		pass_run(stage->passes[PASS_SHADOW], &run);
+		if (!first)
+			distance *= 2;
+		if (distance >= reach)
+			return at;
+	}
+}
+
+static void compute(const struct height_light_stage *stage, const struct scene_block *block, const struct texture *height,
+		    struct tables *tables)
+{
+	const double smoothing = block->slab_light[2];
+	const int shadow = run_shadow(stage, block, height, tables);
+	pass_run(stage->passes[PASS_RECEIVED],
+		 &(struct pass_run){.targets = (struct texture *[]){&tables->received}, .samplers = {height, &tables->shadow[shadow]}});
+	texture_build_mipmaps(&tables->received);
+	pass_run(stage->passes[PASS_SOFTEN],
+		 &(struct pass_run){.targets = (struct texture *[]){&tables->light},
+				    .samplers = {height, &tables->received},
+				    .arguments = {{(float)(short_length * smoothing), (float)smoothing, (float)short_weight}}});
+	texture_build_mipmaps(&tables->light);
+}
+
+static void texture_destroy(void *value)
+{
+	texture_finish(value);
+	free(value);
+}
+
+const struct texture *height_light_get(const struct height_light_stage *stage, struct stage_context *context, const struct scene *scene,
+				       const struct texture *height)
+{
+	struct cache_key key = cache_key_make("height light");
+	stage_key_add_light(&key, scene);
+	struct texture *light = cache_find(context->cache, &key);
+	if (light)
+		return light;
+	context->reused = false;
+	struct tables tables;
+	light = calloc(1, sizeof *light);
+	if (!tables_init(&tables) || !light) {
+		tables_finish(&tables);
+		free(light);
+		return NULL;
+	}
+	compute(stage, &context->block, height, &tables);
+	*light = tables.light;
+	tables.light = (struct texture){0};
+	tables_finish(&tables);
+	return cache_keep(context->cache, &key, light, texture_bytes(light), texture_destroy) ? light : NULL;
+}

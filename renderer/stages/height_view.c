@@ -1,0 +1,91 @@
+#include "renderer/stages/height_view.h"
+
+#include "renderer/log.h"
+
+#include <stdio.h>
+
+/* Pixels a side of the blocks, as in shaders/lib/height_march.glsl. */
+enum { BLOCK = 8 };
+/* Distance within which there are puffs, m, as in shaders/lib/height_detail.glsl. */
+static const double near_m = 1500;
+
+static struct pass *create_pass(const struct pass_compiler *compiler, const char *file, int outputs, enum projection projection, bool near)
+{
+	char defines[96];
+	struct pass_desc desc = {.file = file,
+				 .defines = defines,
+				 .outputs = outputs,
+				 .samplers = {"height_table", "height_light", "smooth_table", "height_start"}};
+	snprintf(defines, sizeof defines, "#define VIEW_PROJECTION %d\n#define HEIGHT_NEAR %d\n", projection, near);
+	if (near)
+		desc.samplers[4] = "field_detail";
+	return pass_create(compiler, &desc);
+}
+
+/* Both programs for a projection; false after log lines. */
+static bool has_passes(struct height_view_stage *stage, enum projection projection, bool near)
+{
+	struct pass **start = &stage->start[projection], **view = &stage->view[projection][near];
+	if (!*start)
+		*start = create_pass(&stage->compiler, "shaders/passes/height_start.glsl", 1, projection, false);
+	if (!*view)
+		*view = create_pass(&stage->compiler, "shaders/passes/height_view.glsl", 2, projection, near);
+	return *start && *view;
+}
+
+bool height_view_init(struct height_view_stage *stage, const struct pass_compiler *compiler)
+{
+	stage->compiler = *compiler;
+	return has_passes(stage, PROJECTION_PERSPECTIVE, false) && has_passes(stage, PROJECTION_PERSPECTIVE, true);
+}
+
+void height_view_finish(struct height_view_stage *stage)
+{
+	for (int i = 0; i < PROJECTION_COUNT; i++) {
+		pass_destroy(stage->start[i]);
+		stage_destroy_passes(stage->view[i], 2);
+	}
+	*stage = (struct height_view_stage){0};
+}
+
+bool height_view_create(const struct scene *scene, struct height_view *seen)
+{
+	const int width = scene->output.width, height = scene->output.height;
+	*seen = (struct height_view){0};
+	const bool ok =
+		texture_init(&seen->start, (width + BLOCK - 1) / BLOCK, (height + BLOCK - 1) / BLOCK, TEXTURE_R32F, TEXTURE_NEAREST) &&
+		texture_init(&seen->place, width, height, TEXTURE_RGBA32F, TEXTURE_NEAREST) &&
+		texture_init(&seen->light, width, height, TEXTURE_RGBA32F, TEXTURE_NEAREST);
+	if (!ok)
+		log_error("view: out of memory");
+	return ok;
+}
+
+bool height_view_run(struct height_view_stage *stage, const struct scene *scene, const struct camera_view *view,
+		     const struct field_maps *field, struct height_view *seen)
+{
+	const bool near = scene->camera.position_m[2] - scene->clouds.base_m - scene->clouds.thickness_m < near_m;
+	if (!has_passes(stage, view->projection, near))
+		return false;
+	/* Blocks of two views at once are made anew for the second, when the first has been drawn. */
+	const int first = view->first_row / BLOCK, end = (view->first_row + view->height + BLOCK - 1) / BLOCK;
+	pass_run(stage->start[view->projection], &(struct pass_run){.targets = (struct texture *[]){&seen->start},
+								    .width = seen->start.width,
+								    .first_row = first,
+								    .height = end - first,
+								    .samplers = {field->height}});
+	pass_run(stage->view[view->projection][near],
+		 &(struct pass_run){.targets = (struct texture *[]){&seen->place, &seen->light},
+				    .width = seen->place.width,
+				    .first_row = view->first_row,
+				    .height = view->height,
+				    .samplers = {field->height, field->light, field->smooth, &seen->start, field->detail}});
+	return true;
+}
+
+void height_view_release(struct height_view *seen)
+{
+	texture_finish(&seen->light);
+	texture_finish(&seen->place);
+	texture_finish(&seen->start);
+}

@@ -1,0 +1,142 @@
+// What of the ground is smaller than a texel of its painted picture, for what lies close by.
+//
+// The small is made at the size of a pixel, whatever that is: noise on the two or three lattices that are just coarse enough to be seen, faded in and out as the
+// footprint changes, so that nothing repeats and nothing is smeared. It changes no mean. VIEW_GROUND: 0 bare, 1 grown over, 2 sea (shaders/lib/sea.glsl), 3 sea ice.
+#ifndef SHADERS_LIB_GROUND_NEAR
+#define SHADERS_LIB_GROUND_NEAR
+#include "shaders/lib/ground_lattice.glsl"
+#include "shaders/lib/slopes.glsl"
+
+// What a pixel sees of the ground.
+struct ground_point {
+	vec2 offset;  // from the camera's foot, m
+	float across; // size of the pixel there across the view, m
+	float mu_v;   // cosine of the view to the vertical there
+	float mu_sun;
+};
+
+#if VIEW_GROUND == 0 || VIEW_GROUND == 3
+// Ripples and drifts lie across no axis.
+vec2 ground_turned(vec2 v)
+{
+	return vec2(0.8 * v.x - 0.6 * v.y, 0.6 * v.x + 0.8 * v.y);
+}
+
+// Bare ground: relief on lattices four times as coarse as each other. ground_patch: y contrast of its reflectance, z deviation of the slopes of one lattice along each
+// axis, w how much longer its small forms are than wide. x: factor of the beam, y: factor of all light.
+vec2 ground_detail(ground_point p)
+{
+	// Forms are seen foreshortened: what a pixel covers along the view is gone.
+	float footprint = 1.4 * p.across * min(inversesqrt(p.mu_v), 2.5);
+	float scale = 0.5 * log2(max(footprint, 1e-3));
+	float finest = floor(scale);
+	float passed = scale - finest;
+	float tangent = min(sqrt(max(1.0 - p.mu_sun * p.mu_sun, 0.0)) / max(p.mu_sun, 0.05), 12.0);
+	vec2 flat_sun = vec2(sun_direction.x, sun_direction.y);
+	vec2 heading = ground_turned(flat_sun * inversesqrt(max(dot(flat_sun, flat_sun), 1e-9)));
+	vec2 foot = ground_turned(vec2(camera_position.x, camera_position.y));
+	vec2 offset = ground_turned(p.offset);
+	float slope = 0.0; // towards the sun
+	float shade = 0.0;
+	float variance = 0.0;
+	for (int i = 0; i < 3; i++) {
+		float size = exp2(2.0 * (finest + float(i) + 0.5));
+		float weight = i == 0 ? 1.0 - passed : i == 2 ? passed : 1.0;
+		// Large forms are flat and longer than wide no more.
+		float flatness = 1.0 / (1.0 + size * size * 0.003);
+		vec2 stretch = vec2(1.0 + (ground_patch.w - 1.0) * flatness, 1.0);
+		vec3 n = ground_noise(ground_lattice_at(foot, offset, size * stretch), 71u + uint(int(finest) + 20 + i));
+		vec2 steepness = weight * flatness * heading / stretch;
+		slope += dot(vec2(n.x, n.y), steepness);
+		shade += weight * n.z;
+		variance += dot(steepness, steepness);
+	}
+	// Sunlight on the slopes over that on the flat, and the mean of it, which a low sun takes away from 1.
+	float tilt = max(ground_patch.z * sqrt(variance) * tangent, 1e-3);
+	float beam = max(1.0 - ground_patch.z * tangent * slope, 0.0) / (tilt * normal_ramp(1.0 / tilt));
+	return vec2(beam, max(1.0 + ground_patch.y * shade, 0.3));
+}
+#endif
+#if VIEW_GROUND == 1
+// What grows stands up: seen at a slant it is tufts and crowns one behind the other, not their pattern on the ground foreshortened. Rows of them stand across the view (nearly: in
+// one of eight directions, on lattices of the world), and the first one that the ray meets on its last way to the ground is seen.
+const int GROUND_ROWS = 4;
+const float GROUND_TUFT = 0.3; // m, the smallest; farther away several are one
+
+// One row's tufts at a place along it, in tufts. x: height 0..1, y: tone -1..1.
+vec2 ground_tuft(float base, float inside, int row, uint seed)
+{
+	float p = floor(inside);
+	float f = inside - p;
+	int column = int(p) + int(base);
+	uint h = noise_hash2(column, row, seed);
+	uint k = noise_hash2(column + 1, row, seed);
+	f = f * f * (3.0 - 2.0 * f);
+	return mix(vec2(float(h & 0xffffu), float(h >> 16u)), vec2(float(k & 0xffffu), float(k >> 16u)), f) * vec2(1.0 / 65535.0, 2.0 / 65535.0) - vec2(0.0, 1.0);
+}
+
+vec2 ground_detail(ground_point p)
+{
+	vec2 place = vec2(camera_position.x, camera_position.y);
+	// Patches of some metres, which also bend the rows, and fray the borders between tufts of one size or direction and the next.
+	vec3 patches = ground_noise(ground_lattice_at(place, p.offset, vec2(4.7)), 61u);
+	float heading = floor(atan(p.offset.x, p.offset.y) * (8.0 / PI) + 0.5 + 0.15 * patches.y) * (PI / 8.0);
+	vec2 forth = vec2(sin(heading), cos(heading));
+	vec2 aside = vec2(forth.y, -forth.x);
+	vec2 offset = vec2(dot(p.offset, aside), dot(p.offset, forth)); // along a row, across rows
+	vec2 foot = vec2(dot(place, aside), dot(place, forth));
+	float level = max(floor(log2(max(p.across * 6.0 / GROUND_TUFT, 1e-3)) + 0.35 * patches.z), 0.0);
+	float size = GROUND_TUFT * exp2(level);
+	float high = min(0.6 * size, 0.4 * camera_position.z);
+	float depth = abs(offset.y) * high / camera_position.z; // across rows, from where the ray is as high as the tufts to where it meets the ground
+	float spacing = GROUND_TUFT * exp2(ceil(log2(max(depth * (1.2 / float(GROUND_ROWS)), 1e-3) / GROUND_TUFT)));
+	float rows = floor(foot.y / spacing);
+	float last = foot.y / spacing - rows + offset.y / spacing + 0.5 * patches.x;
+	float first = last - depth / spacing;
+	float columns = floor(foot.x / size);
+	float start = foot.x / size - columns;
+	float blades = floor(foot.x * (13.0 / size));
+	float blade_start = foot.x * (13.0 / size) - blades;
+	float tone = 0.0;
+	bool met = false;
+	for (int i = 0; i <= GROUND_ROWS; i++) {
+		float row = i == GROUND_ROWS ? last : min(ceil(first) + float(i), last);
+		float share = 1.0 - (last - row) * spacing / max(abs(offset.y), 1e-3); // of the way to the ground
+		int number = int(floor(row + 0.5)) + int(rows);
+		float at = offset.x * share / size;
+		vec2 tuft = ground_tuft(columns, start + at, number, 62u);
+		vec2 blade = ground_tuft(blades, blade_start + at * 13.0, number, 63u);
+		float above = camera_position.z * (1.0 - share);
+		bool meets = !met && (i == GROUND_ROWS || above < high * (0.05 + 0.75 * tuft.x + 0.3 * blade.x));
+		tone = meets ? 0.55 * tuft.y + blade.y + 0.5 * (above / high - 0.37) : tone;
+		met = met || meets;
+	}
+	// Crowns of trees and what is larger differ less than tufts do.
+	float contrast = ground_patch.y * (0.4 + 0.6 / (1.0 + size * size * 0.04));
+	return vec2(1.0, max(1.0 + contrast * (tone + 0.5 * patches.z / (1.0 + p.across)), 0.2));
+}
+#endif
+#if VIEW_GROUND == 3
+const float GROUND_ICE_MIDDLE = 0.42; // at 550 nm, times the scale
+
+// Edges of floes are sharp and ragged, where the painted picture's texels are tens of metres: moved by less than a texel, and steeper around the middle between water and ice.
+vec2 ground_ragged(ground_point p)
+{
+	float texel = ground_mean_albedo.w / ground_patch.x;
+	vec2 foot = vec2(camera_position.x, camera_position.y);
+	vec3 wide = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.9 * texel)), 64u);
+	vec3 narrow = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.23 * texel)), 65u);
+	return texel * (0.22 * vec2(wide.x, wide.z) + 0.10 * vec2(narrow.z, narrow.y));
+}
+
+vec3 ground_ice(vec3 reflectance, float footprint)
+{
+	float texel = ground_mean_albedo.w / ground_patch.x;
+	float steepness = 1.0 + 5.0 / (1.0 + footprint * footprint * (16.0 / texel / texel));
+	float middle = max(GROUND_ICE_MIDDLE * ground_albedo.y, 1e-3);
+	float ice = reflectance.y / middle - 1.0;
+	float sharp = clamp(0.5 + 0.5 * ice * steepness, 0.5 + 0.5 * min(ice, -0.85), 0.5 + 0.5 * max(ice, 0.75));
+	return reflectance * (middle * 2.0 * sharp / max(reflectance.y, 1e-4));
+}
+#endif
+#endif

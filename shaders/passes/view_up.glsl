@@ -1,0 +1,15 @@
+// The color of pixels that look up at the layer. FIELD_NEAR: near ones, of which none shows the sun's disc.
+#include "shaders/lib/colour.glsl"
+#include "shaders/lib/view_up.glsl"
+
+void pass(ivec2 pixel)
+{
+	vec2 at = vec2(pixel) + 0.5;
+#ifdef FIELD_NEAR
+	vec3 disc = vec3(0.0);
+#else
+	vec3 disc = vec3(sun_at_camera) * sun_disc_share(pixel);
+#endif
+	float shown = camera_shows(at) ? 1.0 : 0.0;
+	STORE(0, vec4(shown * colour_of_bands(up_radiance(camera_ray(at), disc)), 1.0));
+}

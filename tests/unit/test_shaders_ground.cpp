@@ -1,0 +1,356 @@
+/* The sea and the ground close by: Fresnel, slopes, glitter and waves against closed forms and published values, compiled for the
+ * processor. No OpenGL. */
+extern "C" {
+#include "renderer/scene.h"
+#include "renderer/stages/sea.h"
+}
+#include "tests/unit/glsl_shim.h"
+
+#include <cstdarg>
+#include <csetjmp>
+#include <cstdint>
+#include <cstdio>
+extern "C" {
+#include <cmocka.h>
+}
+
+#define VIEW_GROUND 0
+namespace glsl
+{
+namespace bare
+{
+#include "shaders/lib/ground_near.glsl"
+#include "shaders/lib/sea.glsl"
+} // namespace bare
+#include "tests/unit/glsl_again.h"
+#undef VIEW_GROUND
+#define VIEW_GROUND 1
+namespace grown
+{
+#include "shaders/lib/ground_near.glsl"
+} // namespace grown
+} // namespace glsl
+
+using namespace glsl::bare;
+using glsl::vec2;
+using glsl::vec3;
+using glsl::vec4;
+
+static const double pi = 3.14159265358979;
+
+/* --- slopes -------------------------------------------------------------------------------------------------------------------- */
+
+static void normal_distribution_is_known(void **)
+{
+	for (double u = -4; u <= 6; u += 0.1) {
+		const double below = 0.5 * std::erfc(-u / std::sqrt(2.0)), density = std::exp(-0.5 * u * u) / std::sqrt(2 * pi);
+		assert_float_equal(normal_below((float)u), below, 2e-4);
+		assert_float_equal(normal_density((float)u), density, 1e-6);
+		assert_float_equal(normal_ramp((float)u), std::fmax(u * below + density, 1e-6), 1e-3);
+	}
+	/* Far from grazing a rough surface shows its flat area. */
+	assert_float_equal(normal_ramp(100.0f), 100, 1e-3);
+}
+
+/* --- Fresnel -------------------------------------------------------------------------------------------------------------------- */
+
+static void fresnel_is_known(void **)
+{
+	assert_float_equal(sea_fresnel(1), std::pow(0.34 / 2.34, 2), 1e-6);
+	assert_float_equal(sea_fresnel(0), 1, 1e-6);
+	/* At Brewster's angle one polarisation is gone: half of ((n^2 - 1) / (n^2 + 1))^2. */
+	const double n2 = 1.34 * 1.34;
+	assert_float_equal(sea_fresnel((float)std::cos(std::atan(1.34))), 0.5 * std::pow((n2 - 1) / (n2 + 1), 2), 1e-6);
+	/* A flat sea sends back 0.066 of uniform light (Burt 1954; 0.0666 for n = 1.34). */
+	double sum = 0;
+	for (int i = 0; i < 2000; i++) {
+		const double mu = (i + 0.5) / 2000;
+		sum += 2 * mu * (double)sea_fresnel((float)mu) / 2000;
+	}
+	assert_float_equal(sum, 0.0666, 0.001);
+}
+
+/* --- glitter -------------------------------------------------------------------------------------------------------------------- */
+
+static vec3 direction(double zenith_deg, double azimuth_deg)
+{
+	const double z = zenith_deg * pi / 180, a = azimuth_deg * pi / 180;
+	return vec3((float)(std::sin(z) * std::sin(a)), (float)(std::sin(z) * std::cos(a)), (float)std::cos(z));
+}
+
+static sea_slopes rough_sea(double wind)
+{
+	sea_slopes s;
+	s.resolved = vec2(0.0f);
+	s.covariance = vec3((float)(0.003 + 1.92e-3 * wind), 0.0f, (float)(3.16e-3 * wind));
+	return s;
+}
+
+/* What the viewer sees of the surface, as sea_radiance has it. */
+static float shown_area(const sea_slopes &s, vec3 to_viewer)
+{
+	const vec2 flat(to_viewer.x, to_viewer.y);
+	const float sine = std::sqrt(std::fmax(glm::dot(flat, flat), 1e-6f));
+	const float deviation = std::sqrt(sea_variance(s.covariance, flat / sine));
+	return sine * deviation * normal_ramp(std::fmin(to_viewer.z / sine / deviation, 1e6f));
+}
+
+/* Flux upwards by a beam of irradiance 1 across it. */
+static double glitter_flux(const sea_slopes &s, vec3 to_sun)
+{
+	enum { ZENITHS = 240, AZIMUTHS = 360 };
+	double sum = 0;
+	for (int i = 0; i < ZENITHS; i++)
+		for (int k = 0; k < AZIMUTHS; k++) {
+			const double mu = (i + 0.5) / ZENITHS;
+			const vec3 v = direction(std::acos(mu) * 180 / pi, (k + 0.5) * 360 / AZIMUTHS);
+			sum += (double)sea_glint(s, v, to_sun, shown_area(s, v)) * mu * 2 * pi / (ZENITHS * AZIMUTHS);
+		}
+	return sum;
+}
+
+/* Flux that the facets mirror upwards, each on its own: the integral over slopes. */
+static double facet_flux(const sea_slopes &s, vec3 to_sun)
+{
+	enum { STEPS = 300 };
+	const double sx = std::sqrt((double)s.covariance.x), sy = std::sqrt((double)s.covariance.z), reach = 5;
+	double sum = 0;
+	for (int i = 0; i < STEPS; i++)
+		for (int k = 0; k < STEPS; k++) {
+			const double x = reach * (2 * (i + 0.5) / STEPS - 1), y = reach * (2 * (k + 0.5) / STEPS - 1);
+			const vec3 normal((float)(sx * x), (float)(sy * y), 1.0f);
+			const double lit = (double)glm::dot(normal, to_sun), cosine = lit / (double)glm::length(normal);
+			const double up = 2 * cosine / (double)glm::length(normal) - (double)to_sun.z;
+			if (lit > 0 && up > 0)
+				sum += std::exp(-0.5 * (x * x + y * y)) / (2 * pi) * (double)sea_fresnel((float)cosine) * lit * 4 * reach *
+				       reach / (STEPS * STEPS);
+		}
+	return sum;
+}
+
+static void glitter_holds_the_reflected_flux(void **)
+{
+	for (double wind = 2; wind <= 14; wind += 6)
+		for (double zenith = 0; zenith <= 60; zenith += 15) {
+			const sea_slopes s = rough_sea(wind);
+			const vec3 sun = direction(zenith, 30);
+			const double found = glitter_flux(s, sun), facets = facet_flux(s, sun);
+			const double flat = (double)sun.z * (double)sea_fresnel(sun.z);
+			print_message("wind %2.0f m/s, sun zenith %2.0f: glitter %.5f, facets %.5f, flat sea %.5f\n", wind, zenith, found,
+				      facets, flat);
+			/* What facets mirror onto others, more with wind and at a slant, is lost. */
+			assert_float_equal(found / facets, 1, zenith < 50 && wind <= 8 ? 0.015 : 0.1);
+			assert_true(found < 1.01 * facets);
+			if (zenith <= 30 && wind <= 8)
+				assert_float_equal(found / flat, 1, 0.05);
+		}
+}
+
+/* The pattern's ridge: no slope sends more sun than that of the mirror where the sun is high, and at a slant it leans towards the viewer.
+ */
+static void glitter_peaks_where_facets_mirror(void **)
+{
+	const sea_slopes s = rough_sea(8);
+	const vec3 sun = direction(30, 0);
+	double best = 0, at = 0;
+	for (double zenith = -80; zenith <= 80; zenith += 0.5) {
+		const vec3 v = direction(std::fabs(zenith), zenith < 0 ? 0 : 180);
+		const double found = (double)sea_glint(s, v, sun, shown_area(s, v));
+		if (found > best)
+			best = found, at = zenith;
+	}
+	print_message("sun at 30 degrees: brightest at %.1f\n", at);
+	assert_true(at > 28 && at < 40);
+}
+
+/* --- the mirrored sky -------------------------------------------------------------------------------------------------------------- */
+
+static void disc_has_equal_areas(void **)
+{
+	for (double zenith = 0.5; zenith < 89; zenith += 4)
+		for (double azimuth = 0; azimuth < 360; azimuth += 25) {
+			const vec3 d = direction(zenith, azimuth), back = sea_sky_direction(sea_sky_coordinates(d));
+			assert_float_equal(glm::length(d - back), 0, 1e-4);
+			const vec2 p = (sea_sky_coordinates(d) - 0.5f) * 2.0f / 0.96f;
+			assert_float_equal(glm::dot(p, p), 1 - std::cos(zenith * pi / 180), 1e-5);
+		}
+}
+
+/* Under a sky of radiance 1 the whole rough sea sends back 0.05 to 0.066 of what it receives (Payne 1972: 0.06 under overcast; Burt 1954
+ * for roughened water), never more than 1 in any direction, and at the horizon less than a flat mirror would. */
+static void sea_under_a_uniform_sky(void **)
+{
+	glsl::image::level texel = {1, 1, {vec4(1.0f)}};
+	auto image = std::make_shared<glsl::image>();
+	image->levels.push_back(texel);
+	glsl::sea_sky = image;
+	glsl::sea_state = vec4(0.0f);
+	for (double wind = 2; wind <= 14; wind += 4) {
+		const sea_slopes s = rough_sea(wind);
+		double sum = 0, grazing = 0;
+		for (int i = 0; i < 400; i++) {
+			const double mu = (i + 0.5) / 400;
+			const vec3 v = direction(std::acos(mu) * 180 / pi, 70);
+			const double found = (double)sea_radiance(s, v, vec3(0, 0, 1), vec3(0.0f), vec3(0.0f)).y;
+			assert_true(found >= 0 && found <= 1);
+			sum += 2 * mu * found / 400;
+			if (i == 2)
+				grazing = found;
+		}
+		print_message("wind %2.0f m/s: %.4f of uniform light, %.3f at 0.4 degrees\n", wind, sum, grazing);
+		assert_true(sum > 0.048 && sum < 0.068);
+		assert_true(grazing < 0.75 && grazing > 0.15);
+	}
+	glsl::sea_sky = nullptr;
+}
+
+/* --- waves ---------------------------------------------------------------------------------------------------------------------- */
+
+static scene_block waves_of(double wind, double time, double x)
+{
+	struct scene scene = scene_default();
+	scene_block block = {};
+	scene.clouds.wind_mps[0] = wind;
+	scene.clouds.wind_mps[1] = 0;
+	scene.clouds.time_s = time;
+	scene.camera.position_m[0] = x;
+	sea_fill_block(&block, &scene);
+	return block;
+}
+
+/* Slopes resolved and not keep Cox and Munk's variance together, from pixels of a centimetre to such of kilometres. */
+static void waves_keep_the_variance(void **)
+{
+	const scene_block block = waves_of(8, 0, 0);
+	glsl::set_scene_block(block);
+	for (double pixel = 0.01; pixel < 3000; pixel *= 8) {
+		enum { PLACES = 20000 };
+		double resolved[2] = {0, 0}, rest[2] = {0, 0};
+		for (int i = 0; i < PLACES; i++) {
+			const double u = i * 0.7548776662, v = i * 0.5698402910;
+			const vec2 place((float)(5000 * (u - std::floor(u))), (float)(5000 * (v - std::floor(v))));
+			const sea_slopes s = sea_slopes_at(place, vec2(0, 1), (float)pixel, (float)(3 * pixel));
+			resolved[0] += (double)s.resolved.x * (double)s.resolved.x / PLACES;
+			resolved[1] += (double)s.resolved.y * (double)s.resolved.y / PLACES;
+			rest[0] += (double)s.covariance.x / PLACES;
+			rest[1] += (double)s.covariance.z / PLACES;
+		}
+		print_message("pixel %7.2f m: resolved %.4f + %.4f, rest %.4f + %.4f\n", pixel, resolved[0], resolved[1], rest[0], rest[1]);
+		assert_float_equal(resolved[0] + rest[0], 3.16e-3 * 8, 0.05 * 3.16e-3 * 8);
+		assert_float_equal(resolved[1] + rest[1], 0.003 + 1.92e-3 * 8, 0.05 * (0.003 + 1.92e-3 * 8));
+		assert_true(rest[0] > 0.1 * 3.16e-3 * 8 && rest[1] > 0.1 * 1.92e-3 * 8);
+		if (pixel > 100)
+			assert_true(resolved[0] + resolved[1] < 1e-4);
+	}
+}
+
+/* Each wave runs with sqrt(g / k), at any time alike, and stays where it is when the camera moves. */
+static void waves_run_as_on_deep_water(void **)
+{
+	for (double time = 0; time <= 1e7; time = time * 30 + 10) {
+		const scene_block a = waves_of(10, time, 0), b = waves_of(10, time + 0.01, 0), c = waves_of(10, time, 37);
+		for (int i = 0; i < ::SEA_WAVES; i++) {
+			const double kx = (double)a.sea_waves[i][0], ky = (double)a.sea_waves[i][1], k = std::hypot(kx, ky);
+			const double turned = std::remainder((double)a.sea_waves[i][2] - (double)b.sea_waves[i][2], 2 * pi);
+			assert_float_equal(turned, 0.01 * std::sqrt(9.81 * k), 2e-5);
+			const double moved = std::remainder((double)c.sea_waves[i][2] - (double)a.sea_waves[i][2] - 37 * kx, 2 * pi);
+			assert_float_equal(moved, 0, 1e-3);
+			assert_true(k > 0.07 && k < 2 * pi / 0.08);
+		}
+	}
+}
+
+/* --- the ground close by ---------------------------------------------------------------------------------------------------------- */
+
+static void ground_noise_is_normalised(void **)
+{
+	enum { PLACES = 40000 };
+	double mean = 0, square = 0, slopes[2] = {0, 0};
+	for (int i = 0; i < PLACES; i++) {
+		const double u = i * 0.7548776662, v = i * 0.5698402910;
+		const vec2 place((float)(300 * (u - std::floor(u))), (float)(300 * (v - std::floor(v)))), size(1.3f, 0.7f);
+		const vec3 n = ground_noise(ground_lattice_at(vec2(15000, 8000), place, size), 5u);
+		mean += (double)n.z / PLACES;
+		square += (double)n.z * (double)n.z / PLACES;
+		slopes[0] += (double)n.x * (double)n.x / PLACES;
+		slopes[1] += (double)n.y * (double)n.y / PLACES;
+		/* Derivatives over the lattice, in the same units. */
+		if (i % 100 == 0) {
+			const float e = 1e-3f;
+			const vec3 to = ground_noise(ground_lattice_at(vec2(15000, 8000), place + vec2(e * size.x, 0.0f), size), 5u);
+			assert_float_equal((to.z - n.z) / e / 5.7f * 1.96f, n.x, 0.05 + 0.03 * std::fabs((double)n.x));
+		}
+	}
+	assert_float_equal(mean, 0, 0.02);
+	assert_float_equal(square, 1, 0.06);
+	assert_float_equal(slopes[0], 1, 0.06);
+	assert_float_equal(slopes[1], 1, 0.06);
+}
+
+static void set_ground(double contrast, double slope, double stretch, double sun_elevation)
+{
+	glsl::ground_patch = vec4(1024.0f, (float)contrast, (float)slope, (float)stretch);
+	const vec3 sun = direction(90 - sun_elevation, 140);
+	glsl::sun_direction = vec4(sun.x, sun.y, sun.z, 0.00465f);
+	glsl::camera_position = vec4(3000.0f, 4000.0f, 2.0f, 1.5e-3f);
+}
+
+/* Means of both factors over a ring of the ground, 1 wherever it lies and however low the sun. */
+template <typename Point, typename Detail> static void mean_detail(double distance, double sun_elevation, Detail detail, double mean[2])
+{
+	enum { PLACES = 20000 };
+	mean[0] = mean[1] = 0;
+	for (int i = 0; i < PLACES; i++) {
+		const double u = i * 0.7548776662, v = i * 0.5698402910;
+		const double azimuth = 2 * pi * (u - std::floor(u)), t = distance * (1 + 0.5 * (v - std::floor(v)));
+		/* From many places, since patches are some metres wide. */
+		glsl::camera_position.x = (float)(20000 * (i * 0.4142135624 - std::floor(i * 0.4142135624)));
+		glsl::camera_position.y = (float)(20000 * (i * 0.7320508076 - std::floor(i * 0.7320508076)));
+		Point p;
+		p.offset = vec2((float)(t * std::sin(azimuth)), (float)(t * std::cos(azimuth)));
+		p.across = (float)(1.5e-3 * t);
+		p.mu_v = (float)(2 / std::hypot(t, 2.0));
+		p.mu_sun = (float)std::sin(sun_elevation * pi / 180);
+		const vec2 found = detail(p);
+		mean[0] += (double)found.x / PLACES;
+		mean[1] += (double)found.y / PLACES;
+	}
+}
+
+static void detail_changes_no_mean(void **)
+{
+	for (double distance = 3; distance < 5000; distance *= 6)
+		for (double elevation = 3; elevation < 90; elevation *= 3) {
+			double bare[2], grown[2];
+			set_ground(0.16, 0.16, 1, elevation);
+			mean_detail<ground_point>(
+				distance, elevation, [](const ground_point &p) { return ground_detail(p); }, bare);
+			set_ground(0.32, 0, 1, elevation);
+			mean_detail<glsl::grown::ground_point>(
+				distance, elevation, [](const glsl::grown::ground_point &p) { return glsl::grown::ground_detail(p); },
+				grown);
+			print_message("%6.0f m, sun %2.0f degrees: bare %.3f, %.3f; grown %.3f, %.3f\n", distance, elevation, bare[0],
+				      bare[1], grown[0], grown[1]);
+			for (int k = 0; k < 2; k++) {
+				assert_float_equal(bare[k], 1, 0.03);
+				assert_float_equal(grown[k], 1, 0.03);
+			}
+		}
+}
+
+int main()
+{
+	const CMUnitTest tests[] = {
+		cmocka_unit_test(normal_distribution_is_known),
+		cmocka_unit_test(fresnel_is_known),
+		cmocka_unit_test(glitter_holds_the_reflected_flux),
+		cmocka_unit_test(glitter_peaks_where_facets_mirror),
+		cmocka_unit_test(disc_has_equal_areas),
+		cmocka_unit_test(sea_under_a_uniform_sky),
+		cmocka_unit_test(waves_keep_the_variance),
+		cmocka_unit_test(waves_run_as_on_deep_water),
+		cmocka_unit_test(ground_noise_is_normalised),
+		cmocka_unit_test(detail_changes_no_mean),
+	};
+	return cmocka_run_group_tests(tests, nullptr, nullptr);
+}

@@ -9,9 +9,9 @@ vec3 colour_of_bands(vec3 bands)
 	return vec3(band_red) * bands.x + vec3(band_green) * bands.y + vec3(band_blue) * bands.z;
 }
 
-// Film for daylight takes sunlight of 5500 K for white, while Rec.709 is white at 6500 K: factors that bring D55 two thirds of the way to D65. Pictures in files of
-// scene light (EXR), and the linear tone, stay colorimetric.
-const vec3 COLOUR_FILM_BALANCE = vec3(0.937, 1.008, 1.138);
+// Film for daylight takes warmer light for white than Rec.709 does, which is white at 6500 K: factors that make light of some 5900 K white, between the sun's and that of the whole
+// sky, so that sunlit cloud keeps a trace of the sun's warmth and a grey sky a trace of blue. Pictures in files of scene light (EXR), and the linear tone, stay colorimetric.
+const vec3 COLOUR_FILM_BALANCE = vec3(0.93, 1.015, 1.10);
 
 // The filmic curve, a channel at a time: 1 - (1 + a x^c / n)^-n. The exponent c makes shadows and middle greys a little steeper than linear, as film is; n sets how long the
 // shoulder is: the larger, the sooner white. Middle grey 0.18 comes out at 0.15, twice white (2.0) at 0.79, and white itself only at infinity.

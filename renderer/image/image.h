@@ -15,7 +15,7 @@
 struct image_metadata {
 	const char *scene_json; /* canonical scene, kept as "stratus:scene"; never NULL */
 	const char *request_id; /* or NULL; not written to files (same scene, same bytes), for the log only */
-	const char *software;   /* "stratus 0.2.0" */
+	const char *software;   /* "stratus 0.3.0" */
 };
 
 struct image_buffer {

@@ -158,7 +158,7 @@ static void paths_are_layers(void **state)
 static void random_scenes_are_sane(void **state)
 {
 	(void)state;
-	for (int i = 0; i < 40; i++) {
+	for (int i = 0; i < 200; i++) {
 		struct scene scene = random_scene();
 		struct frame frame = render(&scene);
 		check_values(i, &frame);

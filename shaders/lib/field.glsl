@@ -104,7 +104,12 @@ float field_thickness_shadow(vec2 place, float footprint)
 {
 	float lod = max(0.6, log2(footprint * cloud_threshold.w / cloud_layer.z));
 	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
-	return field_thickness_of(textureLod(field_coarse, uv, lod).x, footprint);
+#ifdef FIELD_PACKED
+	float density = packed_linear_between(field_coarse, uv, int(cloud_threshold.w), lod);
+#else
+	float density = textureLod(field_coarse, uv, lod).x;
+#endif
+	return field_thickness_of(density, footprint);
 }
 
 float field_thickness(vec2 place, float footprint)

@@ -184,6 +184,57 @@ static struct scene sea_scene(double sun_elevation)
 	return scene;
 }
 
+/* Light on the ground straight below, on a grid of points, as a camera at some height sees it; NAN where the layer is before it. */
+static void light_below(struct scene scene, double height, double values[][60])
+{
+	scene.camera.position_m[2] = height;
+	struct frame frame = render(&scene);
+	for (int y = 0; y < 60; y++)
+		for (int x = 0; x < 60; x++) {
+			double direction[3] = {50.0 * (x - 29.5), 50.0 * (y - 29.5), -height}, at[2];
+			assert_true(project(&scene, direction, at));
+			const int column = (int)at[0], row = (int)at[1];
+			assert_true(column >= 0 && row >= 0 && column < frame.width && row < frame.height);
+			values[y][x] = luminance_of(&frame, LAYER_GROUND, column, row);
+			if (pixel_of(&frame, LAYER_TRANSMITTANCE, column, row)[1] < 0.98f)
+				values[y][x] = NAN;
+		}
+	frame_finish(&frame);
+}
+
+/* The shadows are the same ones from just below the layer and from just above it, which come out of different tables. */
+static void shadows_are_the_same_from_below_and_above(void **state)
+{
+	(void)state;
+	for (int i = 0; i < 3; i++) {
+		struct scene scene = small_scene(360, 360, LAYER(GROUND) | LAYER(TRANSMITTANCE));
+		scene.clouds.coverage = 0.4;
+		scene.clouds.seed = (uint32_t)(7 + i);
+		scene.clouds.base_m = 1000;
+		scene.clouds.thickness_m = 60;
+		scene.ground.type = GROUND_LAMBERT;
+		for (int k = 0; k < 3; k++)
+			scene.ground.albedo[k] = 0.5;
+		scene.sun = (struct scene_sun){.elevation_deg = 50, .azimuth_deg = 40 + 110 * i};
+		scene.camera.elevation_deg = -90;
+		scene.camera.azimuth_deg = 0;
+		scene.camera.vertical_fov_deg = 125;
+		static double below[60][60], above[60][60];
+		light_below(scene, 990, below);
+		light_below(scene, 1070, above);
+		double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+		for (int k = 0; k < 3600; k++) {
+			const double u = below[k / 60][k % 60], v = above[k / 60][k % 60];
+			if (isfinite(u) && isfinite(v))
+				n++, a += u, b += v, aa += u * u, bb += v * v, ab += u * v;
+		}
+		const double correlation = (ab - a * b / n) / sqrt((aa - a * a / n) * (bb - b * b / n));
+		print_message("sun from %.0f: light on %.0f places of the ground from below and above: correlation %.3f\n",
+			      scene.sun.azimuth_deg, n, correlation);
+		assert_true(n > 500 && correlation > 0.9);
+	}
+}
+
 static void sea_glitters_below_the_sun(void **state)
 {
 	(void)state;
@@ -227,11 +278,9 @@ static void sea_mirrors_the_deck(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(mean_albedos_are_published_ones),
-		cmocka_unit_test(sea_albedo_follows_the_sun),
-		cmocka_unit_test(shadows_lie_where_the_parallax_says),
-		cmocka_unit_test(sea_glitters_below_the_sun),
-		cmocka_unit_test(sea_mirrors_the_deck),
+		cmocka_unit_test(mean_albedos_are_published_ones),     cmocka_unit_test(sea_albedo_follows_the_sun),
+		cmocka_unit_test(shadows_lie_where_the_parallax_says), cmocka_unit_test(shadows_are_the_same_from_below_and_above),
+		cmocka_unit_test(sea_glitters_below_the_sun),          cmocka_unit_test(sea_mirrors_the_deck),
 	};
 	return RUN_WITH_RENDERER(tests);
 }

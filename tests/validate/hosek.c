@@ -86,7 +86,8 @@ static double difference_of(const struct hosek *hosek, const struct hosek_sky *s
 	for (int view = 0; view <= 75; view += 15)
 		for (int azimuth = 0; azimuth <= 180; azimuth += 45) {
 			const double z = view * DEGREE, sun = sky->sun_zenith;
-			const double cosine = cos(sun) * cos(z) + sin(sun) * sin(z) * cos(azimuth * DEGREE), angle = acos(fmin(1, fmax(-1, cosine)));
+			const double cosine = cos(sun) * cos(z) + sin(sun) * sin(z) * cos(azimuth * DEGREE),
+				     angle = acos(fmin(1, fmax(-1, cosine)));
 			const double ratio = hosek_luminance(hosek, &other, z, angle) / hosek_luminance(hosek, sky, z, angle);
 			worst = fmax(worst, fabs(ratio - 1));
 		}

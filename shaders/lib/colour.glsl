@@ -13,6 +13,13 @@ vec3 colour_of_bands(vec3 bands)
 // sky, so that sunlit cloud keeps a trace of the sun's warmth and a grey sky a trace of blue. Pictures in files of scene light (EXR), and the linear tone, stay colorimetric.
 const vec3 COLOUR_FILM_BALANCE = vec3(0.93, 1.015, 1.10);
 
+// Light far beyond white loses its colour on film, whose layers are all saturated: towards grey of the same luminance, half way at ten times white.
+vec3 colour_bleach(vec3 rgb)
+{
+	float luminance = dot(rgb, vec3(0.2126, 0.7152, 0.0722));
+	return mix(rgb, vec3(luminance), luminance * luminance / (luminance * luminance + 100.0));
+}
+
 // The filmic curve, a channel at a time: 1 - (1 + a x^c / n)^-n. The exponent c makes shadows and middle greys a little steeper than linear, as film is; n sets how long the
 // shoulder is: the larger, the sooner white. Middle grey 0.18 comes out at 0.15, twice white (2.0) at 0.79, and white itself only at infinity.
 float colour_filmic(float x)

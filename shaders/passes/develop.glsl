@@ -7,7 +7,7 @@ void pass(ivec2 pixel)
 {
 	vec3 rgb = colour_into_gamut(vec3(texelFetch(picture, pixel, 0))) * exp2(develop.y);
 	if (develop.z < 0.5) {
-		rgb *= COLOUR_FILM_BALANCE;
+		rgb = colour_bleach(rgb * COLOUR_FILM_BALANCE);
 		rgb = vec3(colour_filmic(rgb.x), colour_filmic(rgb.y), colour_filmic(rgb.z));
 	}
 	rgb = min(rgb, vec3(1.0));

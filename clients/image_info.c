@@ -16,6 +16,7 @@ static void add_text(json_t *info, const char *name, const char *text, size_t le
 	json_t *scene = strcmp(name, scene_name) == 0 ? json_loadb(text, length, JSON_REJECT_DUPLICATES, NULL) : NULL;
 	if (json_is_object(scene)) {
 		json_object_set_new(info, "scene", scene);
+		json_object_set_new(info, IMAGE_INFO_SCENE_TEXT, json_stringn(text, length));
 		return;
 	}
 	json_decref(scene);

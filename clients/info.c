@@ -49,6 +49,18 @@ static void print_channels(const json_t *channels)
 	putchar('\n');
 }
 
+static const char *scene_text(const json_t *info)
+{
+	return json_string_value(json_object_get(info, IMAGE_INFO_SCENE_TEXT));
+}
+
+static void print_json(json_t *info)
+{
+	json_object_del(info, IMAGE_INFO_SCENE_TEXT);
+	json_dumpf(info, stdout, JSON_INDENT(2));
+	putchar('\n');
+}
+
 static void print_text(json_t *info)
 {
 	const char *name;
@@ -61,7 +73,7 @@ static void print_text(json_t *info)
 	json_object_foreach(json_object_get(info, "attributes"), name, value) print_value(name, value);
 	if (json_object_get(info, "scene")) {
 		print_name("stratus:scene");
-		json_dumpf(json_object_get(info, "scene"), stdout, JSON_INDENT(2) | JSON_ENSURE_ASCII);
+		print_plain(scene_text(info));
 		putchar('\n');
 	}
 }
@@ -73,8 +85,10 @@ static int print(json_t *info, int form, const char *path)
 		client_error("%s: holds no scene", path);
 		return CLIENT_USAGE;
 	}
-	if (form)
-		json_dumpf(form == AS_SCENE ? scene : info, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)), putchar('\n');
+	if (form == AS_SCENE)
+		puts(scene_text(info));
+	else if (form == AS_JSON)
+		print_json(info);
 	else
 		print_text(info);
 	return fflush(stdout) == 0 && !ferror(stdout) ? CLIENT_OK : CLIENT_UNWRITABLE;

@@ -2,6 +2,7 @@
 
 #include "server/sun_position.h"
 
+#include <math.h>
 #include <stdio.h>
 
 static bool given(const struct scene_input *input, const char *section, const char *name)
@@ -102,8 +103,8 @@ static void check_ground(struct scene_input *input, struct problem *problem)
 		ground->albedo[0] = ground->albedo[1] = ground->albedo[2] = 0;
 	}
 	if (scene_ground_largest_reflectance(ground) > 1)
-		problem_add(problem, "/ground/albedo_scale", "times the albedo exceeds 1: at most %.3g for this ground",
-			    ground->albedo_scale / scene_ground_largest_reflectance(ground));
+		problem_add(problem, "/ground/albedo_scale", "times the albedo exceeds 1: at most %g for this ground",
+			    floor(1000 * ground->albedo_scale / scene_ground_largest_reflectance(ground)) / 1000); /* never up */
 }
 
 static void check_camera(const struct scene_input *input, struct problem *problem)

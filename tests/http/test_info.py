@@ -93,3 +93,12 @@ def test_files_that_lie(files, tmp_path):
         assert (told.returncode, told.stdout) == (2, "")
         assert os.path.basename(path) in told.stderr
     assert info(files / "sky.png", "--wrong").returncode == 2
+
+
+def test_numbers_stand_as_they_were(daemon, tmp_path):
+    scene = {"sun": {"elevation_deg": 0.1 + 0.2, "azimuth_deg": 1 / 3}, "output": {"width": 32, "height": 24}}
+    (tmp_path / "x.png").write_bytes(daemon.render(scene).body)
+    told = info(tmp_path / "x.png", "--scene").stdout
+    assert '"elevation_deg":0.30000000000000004,"azimuth_deg":0.3333333333333333}' in told and '"coverage":0.7,' in told
+    assert '"coverage":0.7,' in info(tmp_path / "x.png").stdout
+    assert json.loads(info(tmp_path / "x.png", "--json").stdout)["scene"] == json.loads(told)

@@ -228,6 +228,14 @@ def test_later_members_say_so(daemon, section, member, values):
         assert any(e["pointer"] == f"/{section}/{member}" and "not available yet" in e["detail"] for e in answer.json["errors"])
 
 
+@pytest.mark.parametrize("albedo", [0.6, 0.55, 0.7, 0.87])
+def test_the_limit_that_an_error_names_is_taken(daemon, albedo):
+    scene = {"ground": {"type": "lambert", "albedo": [albedo] * 3, "albedo_scale": 2}, "output": {"width": 32, "height": 24}}
+    detail = daemon.render(scene).json["errors"][0]["detail"]
+    scene["ground"]["albedo_scale"] = float(detail.split("at most ")[1].split()[0])
+    assert daemon.render(scene).status == 200
+
+
 def test_not_found(daemon):
     for path in ("/nothing", "/v1/render/", "/v1", "//", "/../etc/passwd", "/v1/renderx", "/v1/slabx"):
         assert_problem(daemon.get(path), 404, "not-found")

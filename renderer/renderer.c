@@ -7,6 +7,7 @@
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/illuminance.h"
+#include "renderer/stages/sun_cover.h"
 #include "renderer/stages/sea.h"
 
 #include <epoxy/gl.h>
@@ -26,6 +27,7 @@ struct renderer {
 	struct radiosity_stage radiosity;
 	struct view_stage view;
 	struct illuminance_stage illuminance;
+	struct sun_cover_stage sun_cover;
 	struct sea_stage sea;
 	struct gl_timer timers[STAGE_COUNT];
 };
@@ -39,12 +41,14 @@ static bool compile_stages(struct renderer *renderer, const struct pass_compiler
 	ground_stage_init(&renderer->ground, compiler);
 	sea_stage_init(&renderer->sea, compiler);
 	illuminance_stage_init(&renderer->illuminance, compiler);
+	sun_cover_stage_init(&renderer->sun_cover, compiler);
 	return sky_stage_init(&renderer->sky, compiler) && field_stage_init(&renderer->field, compiler) &&
 	       radiosity_stage_init(&renderer->radiosity, compiler) && view_stage_init(&renderer->view, compiler);
 }
 
 static void finish_stages(struct renderer *renderer)
 {
+	sun_cover_stage_finish(&renderer->sun_cover);
 	illuminance_stage_finish(&renderer->illuminance);
 	sea_stage_finish(&renderer->sea);
 	view_stage_finish(&renderer->view);
@@ -356,7 +360,9 @@ static bool run_view(struct job *job)
 	context->block.develop[2] = output->tone;
 	context->block.develop[3] = output->bits == 16 ? 65535 : 255;
 	stage_upload_block(context);
-	if (!measure_illuminance(job, &inputs))
+	inputs.sun_cover = sun_cover_stage_run(&renderer->sun_cover, context, job->scene, &job->maps,
+					       job->clouds && job->scene->camera.position_m[2] < job->scene->clouds.base_m);
+	if (!inputs.sun_cover || !measure_illuminance(job, &inputs))
 		return false;
 	frame->layer_count = list_layers(job->scene, frame->layer);
 	if (job->scene->ground.type == GROUND_SEA && !run_sea(job, &inputs))

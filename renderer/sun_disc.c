@@ -16,11 +16,13 @@ enum {
 struct sample {
 	int column, row;
 	double light;
+	const float *passed; /* per band */
 };
 
 struct samples {
 	struct sample *list;
 	int count;
+	const float *passed;   /* of the direction at hand */
 	double visible, total; /* light of those above the horizon, and of all */
 };
 
@@ -56,7 +58,7 @@ static bool shows_sky(const struct camera_view *view, int column, int row, doubl
 
 static void add(struct samples *samples, int column, int row, double light)
 {
-	samples->list[samples->count++] = (struct sample){column, row, light};
+	samples->list[samples->count++] = (struct sample){column, row, light, samples->passed};
 }
 
 /* To the pixel around a point, or where that does not show the sky to the nearest neighbour that does. */
@@ -100,8 +102,51 @@ static void add_between(struct samples *samples, const struct camera_view *view,
 
 /* --- spreading ---------------------------------------------------------------------------------------------------------------------- */
 
+/* Of the cover's texel around a direction; x, y in radii along a and b. */
+static const float *passed_at(const struct sun_cover *cover, double x, double y)
+{
+	static const float all[3] = {1, 1, 1};
+	if (!cover)
+		return all;
+	const int column = (int)(0.5 * (x + 1) * SUN_COVER_SIDE), row = (int)(0.5 * (y + 1) * SUN_COVER_SIDE);
+	const int last = SUN_COVER_SIDE - 1;
+	return cover->share[row < 0 ? 0 : row > last ? last : row][column < 0 ? 0 : column > last ? last : column];
+}
+
+static double limb(double area)
+{
+	return 1 - SUN_LIMB_DARKENING * (1 - sqrt(1 - area));
+}
+
+void sun_cover_clear(struct sun_cover *cover, const double sun[3])
+{
+	double a[3], b[3];
+	perpendiculars(sun, a, b);
+	for (int i = 0; i < 3; i++)
+		cover->a[i] = (float)a[i], cover->b[i] = (float)b[i];
+	for (int i = 0; i < SUN_COVER_SIDE * SUN_COVER_SIDE; i++)
+		for (int band = 0; band < 4; band++)
+			cover->share[i / SUN_COVER_SIDE][i % SUN_COVER_SIDE][band] = 1;
+}
+
+void sun_cover_mean(const struct sun_cover *cover, double mean[3])
+{
+	enum { COUNT = 4096 };
+	double total = 0;
+	mean[0] = mean[1] = mean[2] = 0;
+	for (int i = 0; i < COUNT; i++) {
+		const double area = (i + 0.5) / COUNT, angle = i * M_PI * (3 - sqrt(5)), light = limb(area);
+		const float *passed = passed_at(cover, sqrt(area) * cos(angle), sqrt(area) * sin(angle));
+		total += light;
+		for (int band = 0; band < 3; band++)
+			mean[band] += light * passed[band];
+	}
+	for (int band = 0; band < 3; band++)
+		mean[band] /= total;
+}
+
 static void spread(struct samples *samples, int count, const struct camera_view *view, const double sun[3], double radius,
-		   double horizon_sine)
+		   double horizon_sine, const struct sun_cover *cover)
 {
 	/* Vogel's spiral: evenly dense in any direction, whatever shape the pixels have. */
 	const double golden = M_PI * (3 - sqrt(5)), turn[2] = {cos(golden), sin(golden)};
@@ -113,7 +158,8 @@ static void spread(struct samples *samples, int count, const struct camera_view 
 		const double x = across * heading[0], y = across * heading[1];
 		const double direction[3] = {along * sun[0] + x * a[0] + y * b[0], along * sun[1] + x * a[1] + y * b[1],
 					     along * sun[2] + x * a[2] + y * b[2]};
-		const double light = 1 - SUN_LIMB_DARKENING * (1 - sqrt(1 - area));
+		const double light = limb(area);
+		samples->passed = passed_at(cover, sqrt(area) * heading[0], sqrt(area) * heading[1]);
 		const double next = heading[0] * turn[0] - heading[1] * turn[1];
 		heading[1] = heading[0] * turn[1] + heading[1] * turn[0];
 		heading[0] = next;
@@ -160,15 +206,21 @@ static void bound(struct sun_disc *disc, const struct camera_view *view, const s
 static bool fill(struct sun_disc *disc, const struct camera_view *view, const struct samples *samples)
 {
 	disc->weights = calloc((size_t)disc->width * (size_t)disc->height, sizeof *disc->weights);
+	disc->passed = calloc((size_t)disc->width * (size_t)disc->height, sizeof *disc->passed);
 	double *sums = calloc((size_t)disc->width * (size_t)disc->height, sizeof *sums);
-	bool ok = disc->weights && sums;
+	bool ok = disc->weights && disc->passed && sums;
 	for (int i = 0; ok && i < samples->count; i++) {
 		const int x = wrapped(view, samples->list[i].column - disc->column), y = samples->list[i].row - disc->row;
 		sums[y * disc->width + x] += samples->list[i].light / samples->visible;
+		for (int band = 0; band < 3; band++)
+			disc->passed[y * disc->width + x][band] +=
+				(float)(samples->list[i].light / samples->visible) * samples->list[i].passed[band];
 	}
 	for (int i = 0; ok && i < disc->width * disc->height; i++) {
 		const int column = wrapped(view, disc->column + i % disc->width), row = disc->row + i / disc->width;
 		disc->weights[i] = (float)(sums[i] / camera_pixel_solid_angle(view, column, row));
+		for (int band = 0; band < 3; band++)
+			disc->passed[i][band] = sums[i] > 0 ? (float)(disc->passed[i][band] / sums[i]) : 0;
 	}
 	free(sums);
 	return ok;
@@ -197,7 +249,8 @@ static bool may_show(const struct camera_view *view, const double sun[3], double
 	return acos(fmin(fmax(cosine, -1), 1)) < corner + 2 * radius;
 }
 
-bool sun_disc_init(struct sun_disc *disc, const struct camera_view *view, const double sun[3], double radius, double horizon_sine)
+bool sun_disc_init(struct sun_disc *disc, const struct camera_view *view, const double sun[3], double radius, double horizon_sine,
+		   const struct sun_cover *cover)
 {
 	*disc = (struct sun_disc){.visible = 1};
 	if (!may_show(view, sun, radius))
@@ -208,7 +261,7 @@ bool sun_disc_init(struct sun_disc *disc, const struct camera_view *view, const 
 	struct samples samples = {.list = malloc(4 * (size_t)count * sizeof *samples.list)};
 	bool ok = samples.list;
 	if (ok) {
-		spread(&samples, count, view, sun, radius, horizon_sine);
+		spread(&samples, count, view, sun, radius, horizon_sine, cover);
 		disc->visible = samples.visible / samples.total;
 	}
 	if (ok && !disc->large && samples.count > 0) {
@@ -225,6 +278,7 @@ bool sun_disc_init(struct sun_disc *disc, const struct camera_view *view, const 
 
 void sun_disc_finish(struct sun_disc *disc)
 {
+	free(disc->passed);
 	free(disc->weights);
 	*disc = (struct sun_disc){0};
 }

@@ -1,7 +1,6 @@
 #include "renderer/stages/disc.h"
 
 #include "renderer/log.h"
-#include "renderer/sun_disc.h"
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
@@ -24,7 +23,7 @@ static void describe(struct disc_view *view, const struct sun_disc *disc, size_t
 	memcpy(view->box, disc->large ? scale : box, sizeof view->box);
 	view->large = disc->large;
 	view->offset = offset;
-	view->bytes = (count_of(disc) ? count_of(disc) : 1) * sizeof *disc->weights; /* nothing at all cannot be bound */
+	view->bytes = (count_of(disc) ? count_of(disc) : 1) * 3 * sizeof *disc->weights; /* nothing at all cannot be bound */
 }
 
 /* By its target, not by its name: Mesa 22.3 forgets for buffers filled by name that they are read by shaders, and overwrites them under
@@ -37,7 +36,16 @@ static void upload(struct disc_buffer *disc, const void *data, size_t bytes)
 	glBufferData(GL_SHADER_STORAGE_BUFFER, (GLsizeiptr)bytes, data, GL_DYNAMIC_DRAW);
 }
 
-bool disc_buffer_fill(struct disc_buffer *disc, const struct scene_block *block, const struct scene *scene, double horizon_sine)
+/* Three bands a pixel. */
+static void write_light(float *to, const struct sun_disc *disc)
+{
+	for (size_t i = 0; disc->weights && i < count_of(disc); i++)
+		for (int band = 0; band < 3; band++)
+			to[3 * i + (size_t)band] = disc->weights[i] * disc->passed[i][band];
+}
+
+bool disc_buffer_fill(struct disc_buffer *disc, const struct scene_block *block, const struct scene *scene, double horizon_sine,
+		      const struct sun_cover *cover)
 {
 	const double sun[3] = {block->sun_direction[0], block->sun_direction[1], block->sun_direction[2]};
 	const int count = camera_view_count(scene);
@@ -47,7 +55,7 @@ bool disc_buffer_fill(struct disc_buffer *disc, const struct scene_block *block,
 	bool ok = true;
 	for (int i = 0; ok && i < count; i++) {
 		const struct camera_view view = camera_view_of(scene, i);
-		ok = sun_disc_init(&discs[i], &view, sun, block->sun_direction[3], horizon_sine);
+		ok = sun_disc_init(&discs[i], &view, sun, block->sun_direction[3], horizon_sine, cover);
 		describe(&disc->views[i], &discs[i], bytes);
 		bytes += (disc->views[i].bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 	}
@@ -56,8 +64,7 @@ bool disc_buffer_fill(struct disc_buffer *disc, const struct scene_block *block,
 		ok = false;
 	}
 	for (int i = 0; ok && i < count; i++)
-		if (discs[i].weights)
-			memcpy(data + disc->views[i].offset, discs[i].weights, disc->views[i].bytes);
+		write_light((float *)(void *)(data + disc->views[i].offset), &discs[i]);
 	if (ok)
 		upload(disc, data, bytes);
 	free(data);

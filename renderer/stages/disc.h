@@ -3,6 +3,7 @@
 #define STRATUS_RENDERER_STAGES_DISC_H
 
 #include "renderer/camera.h"
+#include "renderer/sun_disc.h"
 #include "renderer/scene_block.h"
 
 #include <stddef.h>
@@ -20,8 +21,9 @@ struct disc_buffer {
 };
 
 /* Spreads the disc over the views of a picture (renderer/sun_disc.h). sine: of the horizon's elevation. Waits for pictures that are being
- * drawn with what was there before. false when out of memory. */
-bool disc_buffer_fill(struct disc_buffer *disc, const struct scene_block *block, const struct scene *scene, double horizon_sine);
+ * drawn with what was there before. cover: of the sun; NULL is none. false when out of memory. */
+bool disc_buffer_fill(struct disc_buffer *disc, const struct scene_block *block, const struct scene *scene, double horizon_sine,
+		      const struct sun_cover *cover);
 
 /* Binds the weights of one view and writes its box into the block; the caller uploads that. */
 void disc_buffer_bind(const struct disc_buffer *disc, int view, struct scene_block *block);

@@ -2,10 +2,11 @@
 
 #include "renderer/log.h"
 
+#include <math.h>
 #include <stdlib.h>
 
-/* Rays: enough that a broken sky comes out within half a percent; those on the disc are read apart. */
-enum { COLUMNS = 128, ROWS_EVEN = 144, ROWS_NEAR = 48, ROWS_DISC = 4, ROWS = ROWS_EVEN + ROWS_NEAR + ROWS_DISC };
+/* Rays: enough that a broken sky comes out within half a percent. */
+enum { COLUMNS = 128, ROWS_EVEN = 144, ROWS_NEAR = 48, ROWS = ROWS_EVEN + ROWS_NEAR };
 /* Footprint of a ray, radians: small, since a mean over thickness is not a mean over light. */
 static const float ray_angle = 0.002f;
 
@@ -39,6 +40,15 @@ static void add_rows(float (*texels)[4], int count, double sum[3])
 	}
 }
 
+static void add_beam(const struct scene_block *block, const struct sun_cover *cover, double direct[3])
+{
+	double passed[3] = {1, 1, 1};
+	if (cover)
+		sun_cover_mean(cover, passed);
+	for (int band = 0; band < 3; band++)
+		direct[band] = block->sun_at_camera[band] * passed[band] * fmax(block->sun_direction[2], 0);
+}
+
 static bool compute(const struct pass *pass, struct stage_context *context, const struct view_variant *variant,
 		    const struct view_inputs *inputs, struct illuminance *illuminance)
 {
@@ -48,7 +58,7 @@ static bool compute(const struct pass *pass, struct stage_context *context, cons
 		free(texels);
 		return false;
 	}
-	struct pass_run run = {.targets = (struct texture *[]){&rays}, .arguments = {{COLUMNS, ROWS_EVEN, ROWS_NEAR, ROWS_DISC}}};
+	struct pass_run run = {.targets = (struct texture *[]){&rays}, .arguments = {{COLUMNS, ROWS_EVEN, ROWS_NEAR}}};
 	view_bind_inputs(&run, variant->side, inputs);
 	const float angle = context->block.camera_position[3];
 	context->block.camera_position[3] = ray_angle;
@@ -58,8 +68,8 @@ static bool compute(const struct pass *pass, struct stage_context *context, cons
 	stage_upload_block(context);
 	stage_read_texture(&rays, 0, 4, &texels[0][0]);
 	texture_finish(&rays);
-	add_rows(texels, COLUMNS * (ROWS_EVEN + ROWS_NEAR), illuminance->diffuse);
-	add_rows(texels + COLUMNS * (ROWS_EVEN + ROWS_NEAR), COLUMNS * ROWS_DISC, illuminance->direct);
+	add_rows(texels, COLUMNS * ROWS, illuminance->diffuse);
+	add_beam(&context->block, inputs->sun_cover, illuminance->direct);
 	free(texels);
 	return true;
 }

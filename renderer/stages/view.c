@@ -453,7 +453,7 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	struct height_view seen = {0};
 	struct view_inputs with_seen = *inputs;
 	with_seen.seen = &seen;
-	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0)) &&
+	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0), inputs->sun_cover) &&
 		  (side_of(scene, inputs) != VIEW_ABOVE || see_layer(stage, context, scene, inputs->field, &seen));
 	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;

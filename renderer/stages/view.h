@@ -55,6 +55,7 @@ struct view_inputs {
 	const struct radiosity_light *light; /* NULL without clouds */
 	const struct height_view *seen;      /* of the view stage's own making: what the pixels see of the layer from above */
 	const struct texture *sea_sky;       /* what a sea mirrors; NULL for other grounds */
+	const struct sun_cover *sun_cover;   /* what the layer leaves of the beam; NULL: all of it */
 };
 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler);

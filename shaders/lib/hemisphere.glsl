@@ -1,4 +1,4 @@
-// Directions over the upper hemisphere for its irradiance: even ones, ever denser ones round the sun, whose aureole is steep, and the sun's disc itself.
+// Directions over the upper hemisphere for its irradiance: even ones, ever denser ones round the sun, whose aureole is steep.
 #ifndef SHADERS_LIB_HEMISPHERE
 #define SHADERS_LIB_HEMISPHERE
 #include "shaders/lib/scene_block.glsl"
@@ -47,22 +47,6 @@ hemisphere_sample hemisphere_near(vec2 at, float count)
 	hemisphere_sample s;
 	s.direction = hemisphere_from_sun(angle, 2.0 * PI * at.x);
 	s.weight = 4.0 * PI * HEMISPHERE_NEAR_OUTER * at.y * sin(angle) / count * hemisphere_near_share(angle) * max(s.direction.z, 0.0);
-	return s;
-}
-
-// Light from within a share of the disc's area round its middle, limb darkened by 1 - u (1 - cos), u = 0.6 (renderer/sun_disc.h).
-float hemisphere_disc_light(float area)
-{
-	float left = 1.0 - area;
-	return (0.4 * area + 0.4 * (1.0 - left * sqrt(left))) / 0.8;
-}
-
-// A direction on the sun's disc, in one of `rows` rings of equal area; the weight is that of the ring's light, with a mean of exactly 1.
-hemisphere_sample hemisphere_disc(vec2 at, float rows)
-{
-	hemisphere_sample s;
-	s.direction = hemisphere_from_sun(sun_direction.w * sqrt(at.y), 2.0 * PI * at.x);
-	s.weight = rows * (hemisphere_disc_light(min(at.y + 0.5 / rows, 1.0)) - hemisphere_disc_light(max(at.y - 0.5 / rows, 0.0)));
 	return s;
 }
 #endif

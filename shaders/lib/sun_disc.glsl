@@ -13,8 +13,9 @@
 layout(std430, binding = 1) readonly buffer sun_disc_buffer { float sun_disc_weights[]; };
 #endif
 
-// Share of the sun's direct irradiance per solid angle that a pixel holds, 1/sr.
-float sun_disc_share(ivec2 pixel)
+// Share of the sun's direct irradiance per solid angle that a pixel holds, 1/sr, per band. Of a large disc before a cloud layer; else behind it, as it lies
+// before the disc itself, which a coarse pixel hardly sees.
+vec3 sun_disc_share(ivec2 pixel)
 {
 #if VIEW_LARGE_SUN
 	// Limb darkened by 1 - u (1 - cos), u = 0.6 in the visible (Allen 1973), whose mean over the disc is 1 - u/3. The edge is as soft as the
@@ -29,15 +30,17 @@ float sun_disc_share(ivec2 pixel)
 	float cover = clamp(0.5 + (radius - angle) / max(across, 1e-9), 0.0, 1.0);
 	float rho = min(angle / radius, 1.0);
 	float limb = (1.0 - 0.6 * (1.0 - sqrt(1.0 - rho * rho))) / 0.8;
-	return sun_disc_box.x * cover * limb / (PI * radius * radius);
+	return vec3(sun_disc_box.x * cover * limb / (PI * radius * radius));
 #else
 	// The box may reach over the right edge of the picture.
 	int column = pixel.x - int(sun_disc_box.x);
 	int row = pixel.y - int(sun_disc_box.y);
 	column += column < 0 ? int(image_size.x) : 0;
-	float share = 0.0;
-	if (row >= 0 && column < int(sun_disc_box.z) && row < int(sun_disc_box.w))
-		share = sun_disc_weights[row * int(sun_disc_box.z) + column];
+	vec3 share = vec3(0.0);
+	if (row >= 0 && column < int(sun_disc_box.z) && row < int(sun_disc_box.w)) {
+		int first = 3 * (row * int(sun_disc_box.z) + column);
+		share = vec3(sun_disc_weights[first], sun_disc_weights[first + 1], sun_disc_weights[first + 2]);
+	}
 	return share;
 #endif
 }

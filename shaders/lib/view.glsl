@@ -313,7 +313,10 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud), to_layer * vec3(textureLod(cloud_received, place / cloud_layer.z, 0.0)), parts);
 
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
-	parts.sun_direct = disc * exp(-vec3(extinction) * (p.thickness / p.mu_v));
+	parts.sun_direct = disc;
+#if VIEW_LARGE_SUN
+	parts.sun_direct *= exp(-vec3(extinction) * (p.thickness / p.mu_v));
+#endif
 	parts.sky = max(vec3(textureLod(sky_total, air, 0.0)) - near, vec3(0.0)) * parts.transmittance;
 	parts.air = near * vec3(air_below) + (vec3(1.0) - to_layer) * vec3(air_around);
 	parts.distance = p.thickness > 0.01 ? t : 0.0;
@@ -386,7 +389,7 @@ void view_add_sky(vec3 disc, vec2 air, INOUT(view_parts) parts)
 
 // The whole picture. Decided when the shader is built, since software renderers execute both sides of every branch:
 // VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_SOLVED: shading; VIEW_TWILIGHT: the sun lights the base somewhere; VIEW_COLOR_ONLY: parts are not asked for; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
-// disc: radiance of the sun's disc in the pixel, before the layer.
+// disc: radiance of the sun's disc in the pixel (shaders/lib/sun_disc.glsl).
 // place, light: what a ray from above sees of the layer, as shaders/passes/height_view.glsl stores it; place.x = 0: nothing.
 #if VIEW_ABOVE
 view_parts view_ray_seen(vec3 direction, vec3 disc, vec4 place, vec4 light)

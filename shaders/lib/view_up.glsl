@@ -161,7 +161,7 @@ float up_smooth_thickness(vec2 place, float footprint)
 #endif
 }
 
-// What arrives along a ray that meets the layer from below, W/m2/nm/sr. disc: radiance of the sun's disc in the pixel, before the layer.
+// What arrives along a ray that meets the layer from below, W/m2/nm/sr. disc: radiance of the sun's disc in the pixel (shaders/lib/sun_disc.glsl).
 vec3 up_radiance(vec3 direction, vec3 disc)
 {
 	vec2 air = sky_table_coordinates(direction);
@@ -190,7 +190,10 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec3 radiance = vec3(near) + vec3(sky) * along_view + met * diffuse +
 	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * vec3(light));
 #ifndef FIELD_NEAR
-	radiance += disc * exp(-vec3(extinction) * (thickness / ray.mu_v));
+#if VIEW_LARGE_SUN
+	disc *= exp(-vec3(extinction) * (thickness / ray.mu_v));
+#endif
+	radiance += disc;
 #endif
 	return radiance;
 }

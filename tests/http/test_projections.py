@@ -130,3 +130,25 @@ def test_exposure_is_the_same_everywhere(daemon, read_image):
         _, spec = read_image(daemon.render({"camera": camera, "output": {"width": width, "format": "exr"}}).body)
         exposures.add(spec.getattribute("stratus:exposure_ev"))
     assert len(exposures) == 1
+
+
+@pytest.mark.parametrize("kind", ["stratocumulus", "altocumulus", "cirrocumulus"])
+@pytest.mark.parametrize("projection, width", [("equirectangular", 128), ("equirectangular", 1024), ("fisheye", 256), ("cubemap", 64)])
+def test_the_beam_through_clouds(daemon, read_image, kind, projection, width):
+    """Whatever a pixel's size, the disc in it is dimmed by the cloud before the disc, and the figures are those of the picture."""
+    high = {"altocumulus": {"base_m": 3000, "thickness_m": 100}, "cirrocumulus": {"base_m": 7000, "thickness_m": 50}}.get(kind, {})
+    scene = {
+        "sun": {"elevation_deg": 37, "azimuth_deg": 163},
+        "clouds": {"type": kind, "coverage": 0.6, "seed": 14, **high},
+        "camera": {"projection": projection},
+        "output": {"width": width, "format": "exr", "exr_type": "float", "layers": ["color", "sun_direct"]},
+    }
+    pixels, spec = read_image(daemon.render(scene).body)
+    directions, solid_angle = rays(projection, *pixels.shape[:2])
+    directions, solid_angle = numpy.nan_to_num(directions), numpy.nan_to_num(solid_angle)
+    direct = spec.getattribute("stratus:direct_illuminance_lux")
+    beam = 1000 * (layer(pixels, spec, "sun_direct") * solid_angle).sum() * math.sin(math.radians(37))
+    assert beam == pytest.approx(direct, rel=0.01, abs=1)
+    up = numpy.maximum(directions[..., 2], 0)
+    lux = 1000 * (layer(pixels, spec, "color") * solid_angle * up).sum()
+    assert lux == pytest.approx(spec.getattribute("stratus:global_illuminance_lux"), rel=0.01 if width > 512 else 0.03 if width > 128 or projection != "equirectangular" else 0.06)

@@ -206,7 +206,7 @@ static struct spread spread_over(const struct scene *scene, const double sun[3])
 	for (int i = 0; i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
 		struct sun_disc disc;
-		assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, -8e-4));
+		assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, -8e-4, NULL));
 		assert_false(disc.large);
 		for (int k = 0; k < disc.width * disc.height; k++) {
 			const int column = (disc.column + k % disc.width) % view.width, row = disc.row + k / disc.width;
@@ -291,7 +291,7 @@ static void disc_on_the_wrap_is_small(void **state)
 	struct sun_disc disc;
 	double sun[3];
 	direction_of(0, 30, sun);
-	assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, 0));
+	assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, 0, NULL));
 	assert_in_range(disc.width, 4, 6);
 	assert_in_range(disc.height, 4, 5);
 	assert_in_range(disc.column, 2045, 2047);
@@ -310,7 +310,7 @@ static void disc_is_darker_at_its_limb(void **state)
 	direction_of(90, 40, sun);
 	const struct camera_view view = camera_view_of(&scene, 0);
 	struct sun_disc disc;
-	assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, 0));
+	assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, 0, NULL));
 	assert_false(disc.large);
 	assert_in_range(disc.width, 26, 28);
 	const double middle = disc.weights[disc.height / 2 * disc.width + disc.width / 2];
@@ -332,7 +332,7 @@ static void setting_disc_stays_above_the_horizon(void **state)
 		struct sun_disc disc;
 		double sun[3], sum = 0;
 		direction_of(77, -2, sun);
-		assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, sin(-2 * DEGREE)));
+		assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, sin(-2 * DEGREE), NULL));
 		assert_float_equal(disc.visible, 0.5, 0.01);
 		for (int k = 0; k < disc.width * disc.height; k++) {
 			const int row = disc.row + k / disc.width;
@@ -355,12 +355,12 @@ static void disc_out_of_the_picture_is_nothing(void **state)
 		const struct scene scene = scene_of(PROJECTION_PERSPECTIVE, 64);
 		const struct camera_view view = camera_view_of(&scene, 0); /* azimuth 140, elevation 20 */
 		direction_of(azimuth, 5, sun);
-		assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, 0));
+		assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, 0, NULL));
 		assert_int_equal(disc.width > 0, azimuth == 120 || azimuth == 150);
 		sun_disc_finish(&disc);
 		/* Set: below the horizon as a whole. */
 		direction_of(azimuth, -1, sun);
-		assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, 0));
+		assert_true(sun_disc_init(&disc, &view, sun, SUN_RADIUS, 0, NULL));
 		assert_int_equal(disc.width, 0);
 		sun_disc_finish(&disc);
 	}

@@ -215,7 +215,8 @@ static view_inputs inputs_of(const scene &scene, const made &out)
 		&out.field,
 		scene.clouds.type == CLOUD_NONE ? nullptr : &out.light,
 		nullptr,
-		out.sea_sky};
+		out.sea_sky,
+		nullptr};
 }
 
 /* The stages in their order, as renderer.c runs them. */

@@ -266,7 +266,8 @@ static bool look(struct deck *deck, struct scene scene, double height, double az
 	scene.camera.elevation_deg = elevation;
 	bool ok = make(deck, &scene, made);
 	const struct view_inputs inputs = {
-		&made->ground, made->droplets, made->slab_rows, made->slab_slices, &made->sky, &made->field, &made->light, NULL, NULL};
+		&made->ground, made->droplets, made->slab_rows, made->slab_slices, &made->sky, &made->field, &made->light, NULL, NULL,
+		NULL};
 	if (ok) {
 		stage_upload_block(&deck->context);
 		ok = view_stage_run(&deck->view, &deck->context, &scene, &inputs, layers, LAYERS, NULL, NULL, pictures);

@@ -562,7 +562,7 @@ def test_load(start_daemon):
     running = start_long(daemon)
     assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2)
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
-        waiting = [pool.submit(daemon.get, target(seed=i, **LONG), X_Timeout_Ms="4000") for i in range(4)]
+        waiting = [pool.submit(daemon.get, target(seed=i, **LONG), X_Timeout_Ms="10000") for i in range(4)]
         assert wait_for(lambda: daemon.metric("stratus_tracings_waiting") == 4)
         refused = daemon.get(target(**LONG))
         assert refused.status == 503 and int(refused.headers["Retry-After"]) >= 1

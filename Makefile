@@ -25,7 +25,8 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 # Debian packages: to build and run, and to test. scripts/packages.sh installs those that are missing.
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
 	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
-TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr clang-format procps
+TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr clang-format procps \
+	python3-prometheus-client
 VALIDATE_PACKAGES := gnuplot-nox
 GALLERY_PACKAGES := imagemagick
 

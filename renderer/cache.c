@@ -1,5 +1,6 @@
 #include "renderer/cache.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,6 +11,7 @@ struct entry {
 	size_t bytes;
 	void (*destroy)(void *value);
 	unsigned long frame; /* last one that used it */
+	int owner;
 };
 
 /* A few dozen entries at most: a list is searched faster than the key could be hashed. */
@@ -17,6 +19,8 @@ struct cache {
 	struct entry *first;
 	size_t bound, bytes;
 	unsigned long frame;
+	int owner;
+	_Atomic size_t owned[CACHE_OWNERS];
 };
 
 struct cache_key cache_key_make(const char *name)
@@ -56,6 +60,7 @@ static void drop(struct cache *cache, struct entry **link)
 	struct entry *entry = *link;
 	*link = entry->next;
 	cache->bytes -= entry->bytes;
+	cache->owned[entry->owner] -= entry->bytes;
 	entry->destroy(entry->value);
 	free(entry);
 }
@@ -119,10 +124,16 @@ bool cache_keep(struct cache *cache, const struct cache_key *key, void *value, s
 		destroy(value);
 		return false;
 	}
-	*entry = (struct entry){
-		.next = cache->first, .key = *key, .value = value, .bytes = bytes, .destroy = destroy, .frame = cache->frame};
+	*entry = (struct entry){.next = cache->first,
+				.key = *key,
+				.value = value,
+				.bytes = bytes,
+				.destroy = destroy,
+				.frame = cache->frame,
+				.owner = cache->owner};
 	cache->first = entry;
 	cache->bytes += bytes;
+	cache->owned[cache->owner] += bytes;
 	shrink(cache);
 	return true;
 }
@@ -130,4 +141,14 @@ bool cache_keep(struct cache *cache, const struct cache_key *key, void *value, s
 size_t cache_bytes(const struct cache *cache)
 {
 	return cache->bytes;
+}
+
+void cache_set_owner(struct cache *cache, int owner)
+{
+	cache->owner = owner;
+}
+
+size_t cache_owned_bytes(const struct cache *cache, int owner)
+{
+	return cache->owned[owner];
 }

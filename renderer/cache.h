@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { CACHE_KEY_MAX = 512 };
+enum { CACHE_KEY_MAX = 512, CACHE_OWNERS = 8 };
 
 /* Inputs of a result. Numbers are appended as doubles, so that no padding gets in. */
 struct cache_key {
@@ -37,5 +37,10 @@ bool cache_keep(struct cache *cache, const struct cache_key *key, void *value, s
 
 /* Bytes of all results. */
 size_t cache_bytes(const struct cache *cache);
+
+/* Results kept from here on are counted for `owner`, 0 <= owner < CACHE_OWNERS; 0 at first. */
+void cache_set_owner(struct cache *cache, int owner);
+/* Bytes of an owner's results. Any thread. */
+size_t cache_owned_bytes(const struct cache *cache, int owner);
 
 #endif

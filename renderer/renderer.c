@@ -164,6 +164,13 @@ const struct renderer_info *renderer_info(const struct renderer *renderer)
 	return &renderer->info;
 }
 
+_Static_assert((int)STAGE_COUNT <= (int)CACHE_OWNERS, "every stage owns results");
+
+size_t renderer_cache_bytes(const struct renderer *renderer, enum stage stage)
+{
+	return cache_owned_bytes(renderer->context.cache, stage);
+}
+
 /* --- one frame -------------------------------------------------------------------------------------------------------------------- */
 
 /* Work of one call of renderer_render. */
@@ -434,6 +441,7 @@ static enum render_result run_stages(struct job *job)
 			glFinish();
 		const double begin = clock_milliseconds();
 		renderer->context.reused = i != STAGE_READBACK;
+		cache_set_owner(renderer->context.cache, i);
 		gl_timer_begin(&renderer->timers[i]);
 		const bool ok = stage_functions[i](job);
 		gl_timer_end(&renderer->timers[i]);
@@ -511,6 +519,7 @@ enum render_result renderer_sky_light(struct renderer *renderer, const struct sc
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
 	view_fill_block(&renderer->context.block, &clear);
 	renderer->context.reused = true;
+	cache_set_owner(renderer->context.cache, STAGE_SKY);
 	gl_timer_begin(&renderer->timers[STAGE_SKY]);
 	enum render_result result = run_sky_light(renderer, &clear, directions, light);
 	gl_timer_end(&renderer->timers[STAGE_SKY]);

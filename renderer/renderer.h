@@ -77,6 +77,9 @@ void renderer_destroy(struct renderer *renderer);
 
 const struct renderer_info *renderer_info(const struct renderer *renderer);
 
+/* Bytes of what a stage remembers on the GPU. Any thread, as long as the renderer lives. */
+size_t renderer_cache_bytes(const struct renderer *renderer, enum stage stage);
+
 /* Asked between passes by renderer_render: true stops the work. */
 typedef bool renderer_cancelled(void *context);
 

@@ -21,6 +21,7 @@ struct option {
 static const char *const pass_names[] = {[PASS_AUTO] = "auto", [PASS_FRAGMENT] = "fragment", [PASS_COMPUTE] = "compute", NULL};
 static const char *const level_names[] = {
 	[LOG_ERROR] = "error", [LOG_WARNING] = "warning", [LOG_INFO] = "info", [LOG_DEBUG] = "debug", NULL};
+static const char *const format_names[] = {[LOG_TEXT] = "text", [LOG_JSON] = "json", NULL};
 
 #define AT(member) .offset = offsetof(struct config, member)
 
@@ -64,6 +65,8 @@ static const struct option options[] = {
 	 OPTION_INTEGER, AT(assets_mb), .low = 1, .high = 1048576},
 	{"--log-level", "STRATUS_LOG_LEVEL", "LEVEL", "error, warning, info, debug",
 	 OPTION_CHOICE, AT(log_level), .choices = level_names},
+	{"--log-format", "STRATUS_LOG_FORMAT", "FORMAT", "text, json (an object a line)",
+	 OPTION_CHOICE, AT(log_format), .choices = format_names},
 	{0},
 };
 /* clang-format on */
@@ -198,6 +201,7 @@ static void set_defaults(struct config *config)
 		.assets_disk_mb = 1024,
 		.assets_mb = 256,
 		.log_level = LOG_INFO,
+		.log_format = LOG_TEXT,
 	};
 	if (state && *state == '/')
 		snprintf(config->state_dir_buffer, sizeof config->state_dir_buffer, "%s/stratus", state);

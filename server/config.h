@@ -24,6 +24,7 @@ struct config {
 	int assets_disk_mb;   /* 0..16777216; likewise */
 	int assets_mb;        /* 1..1048576; decoded, in memory */
 	int log_level;        /* enum log_level */
+	int log_format;       /* enum log_format */
 
 	char state_dir_buffer[4096]; /* holds the default of state_dir */
 };

@@ -3,6 +3,7 @@
 #include "renderer/log.h"
 #include "server/clock.h"
 #include "server/negotiation.h"
+#include "server/request_log.h"
 #include "server/response.h"
 #include "server/routes.h"
 
@@ -117,11 +118,11 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	double took = clock_now_ms() - request->started_ms;
 	unsigned status = request->status ? request->status : 499;
 	enum metrics_route route = request->route ? request->route->metrics : ROUTE_OTHER;
-	bool probe = route == ROUTE_HEALTHZ || route == ROUTE_READYZ || route == ROUTE_METRICS;
-	metrics_count_request(service->metrics, route, status, took);
+	if (request->is_head)
+		request->bytes = 0; /* those that a GET would send */
 	/* Without a method: the headers never came, or libmicrohttpd refused them by itself. */
-	log_line(probe ? LOG_DEBUG : LOG_INFO, "%s %.200s %u %.1f ms %s", *request->method ? request->method : "-", request->path, status,
-		 took, *request->id ? request->id : "-");
+	metrics_count_request(service->metrics, route, status, took, request->bytes);
+	request_log(request, status, took);
 	if (request->is_accepted)
 		service->in_flight--;
 	request_destroy(request);

@@ -51,6 +51,7 @@ int main(int argc, char **argv)
 		break;
 	}
 	log_set_level((enum log_level)config.log_level);
+	log_set_format((enum log_format)config.log_format);
 	sigset_t signals = block_signals();
 	struct service *service = service_create(&config);
 	bool ready = service && wait_until_ready(service, &signals);

@@ -3,9 +3,13 @@
 #include "renderer/log.h"
 #include "server/text.h"
 
+#include <dirent.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
 #include <unistd.h>
 
 static const char *const route_names[ROUTE_COUNT] = {"/v1/render", "/v1/optics",      "/v1/slab",    "/v1/sky", "/v1/sun",
@@ -20,9 +24,11 @@ static const char *const source_names[DROPLET_SOURCE_COUNT] = {
 static const unsigned statuses[] = {200, 201, 204, 304, 400, 404, 405, 406, 412, 413, 415, 422, 499, 500, 503, 504, 507, 0};
 enum { STATUS_COUNT = sizeof statuses / sizeof *statuses };
 
+enum { BOUND_COUNT = 16 };
 /* Upper bounds in seconds: half a millisecond to a minute. */
-static const double bounds[] = {0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60};
-enum { BOUND_COUNT = sizeof bounds / sizeof *bounds };
+static const double time_bounds[BOUND_COUNT] = {0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60};
+/* In pixels: thumbnails to a quarter of the largest picture. */
+static const double pixel_bounds[BOUND_COUNT] = {1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 4e6, 8e6, 16e6, 32e6, 64e6};
 
 struct histogram {
 	unsigned long buckets[BOUND_COUNT + 1];
@@ -33,12 +39,16 @@ struct histogram {
 struct metrics {
 	pthread_mutex_t mutex;
 	struct histogram requests[ROUTE_COUNT][STATUS_COUNT];
+	uint64_t bytes[ROUTE_COUNT];
+	unsigned long problems[PROBLEM_KIND_COUNT];
 	struct histogram stages[TIMING_COUNT];
+	struct histogram pictures; /* by pixels */
 	unsigned long reused[TIMING_COUNT];
 	unsigned long rejected[REJECTION_COUNT];
 	unsigned long ended[END_COUNT];
 	unsigned long tracings_ended[END_COUNT];
 	double photons;
+	double started_s; /* Unix time */
 };
 
 struct metrics *metrics_create(void)
@@ -49,6 +59,7 @@ struct metrics *metrics_create(void)
 		return NULL;
 	}
 	pthread_mutex_init(&metrics->mutex, NULL);
+	metrics->started_s = (double)time(NULL);
 	return metrics;
 }
 
@@ -60,23 +71,38 @@ void metrics_destroy(struct metrics *metrics)
 	free(metrics);
 }
 
-static void observe(struct histogram *histogram, double seconds)
+static void observe(struct histogram *histogram, const double bounds[static BOUND_COUNT], double value)
 {
 	int i = 0;
-	while (i < BOUND_COUNT && seconds > bounds[i])
+	while (i < BOUND_COUNT && value > bounds[i])
 		i++;
 	histogram->buckets[i]++;
 	histogram->count++;
-	histogram->sum += seconds;
+	histogram->sum += value;
 }
 
-void metrics_count_request(struct metrics *metrics, enum metrics_route route, unsigned status, double milliseconds)
+void metrics_count_request(struct metrics *metrics, enum metrics_route route, unsigned status, double milliseconds, uint64_t bytes)
 {
 	int i = 0;
 	while (i < STATUS_COUNT - 1 && statuses[i] != status)
 		i++;
 	pthread_mutex_lock(&metrics->mutex);
-	observe(&metrics->requests[route][i], milliseconds * 1e-3);
+	observe(&metrics->requests[route][i], time_bounds, milliseconds * 1e-3);
+	metrics->bytes[route] += bytes;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_problem(struct metrics *metrics, enum problem_kind kind)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->problems[kind]++;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_picture(struct metrics *metrics, double pixels)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	observe(&metrics->pictures, pixel_bounds, pixels);
 	pthread_mutex_unlock(&metrics->mutex);
 }
 
@@ -87,7 +113,7 @@ void metrics_count_timings(struct metrics *metrics, const struct timings *timing
 		if (timings->entry[i].reused)
 			metrics->reused[i]++;
 		else if (timings->entry[i].measured)
-			observe(&metrics->stages[i], timings->entry[i].milliseconds * 1e-3);
+			observe(&metrics->stages[i], time_bounds, timings->entry[i].milliseconds * 1e-3);
 	}
 	pthread_mutex_unlock(&metrics->mutex);
 }
@@ -125,17 +151,29 @@ static void write_family(struct text *text, const char *name, const char *type, 
 	text_printf(text, "# TYPE stratus_%s %s\n# HELP stratus_%s %s\n", name, type, name, help);
 }
 
-/* labels: without braces and not empty. */
-static void write_histogram(struct text *text, const char *name, const char *labels, const struct histogram *histogram)
+/* A whole number has a point, as OpenMetrics writes the bounds of buckets: else two scrapers may take one series for two. */
+static void format_bound(double bound, char text[static 32])
 {
+	snprintf(text, 32, "%g", bound);
+	if (!strpbrk(text, ".e"))
+		strcat(text, ".0");
+}
+
+/* labels: without braces; may be empty. */
+static void write_histogram(struct text *text, const char *name, const char *labels, const struct histogram *histogram,
+			    const double bounds[static BOUND_COUNT])
+{
+	const char *comma = *labels ? "," : "", *open = *labels ? "{" : "", *close = *labels ? "}" : "";
 	unsigned long total = 0;
 	for (int i = 0; i < BOUND_COUNT; i++) {
+		char bound[32];
+		format_bound(bounds[i], bound);
 		total += histogram->buckets[i];
-		text_printf(text, "stratus_%s_bucket{%s,le=\"%g\"} %lu\n", name, labels, bounds[i], total);
+		text_printf(text, "stratus_%s_bucket{%s%sle=\"%s\"} %lu\n", name, labels, comma, bound, total);
 	}
-	text_printf(text, "stratus_%s_bucket{%s,le=\"+Inf\"} %lu\n", name, labels, histogram->count);
-	text_printf(text, "stratus_%s_count{%s} %lu\n", name, labels, histogram->count);
-	text_printf(text, "stratus_%s_sum{%s} %.6f\n", name, labels, histogram->sum);
+	text_printf(text, "stratus_%s_bucket{%s%sle=\"+Inf\"} %lu\n", name, labels, comma, histogram->count);
+	text_printf(text, "stratus_%s_count%s%s%s %lu\n", name, open, labels, close, histogram->count);
+	text_printf(text, "stratus_%s_sum%s%s%s %.6f\n", name, open, labels, close, histogram->sum);
 }
 
 static void request_labels(int route, int status, char *labels, size_t size)
@@ -161,8 +199,30 @@ static void write_requests(struct text *text, const struct metrics *metrics)
 		for (int status = 0; status < STATUS_COUNT; status++) {
 			request_labels(route, status, labels, sizeof labels);
 			if (metrics->requests[route][status].count)
-				write_histogram(text, "request_duration_seconds", labels, &metrics->requests[route][status]);
+				write_histogram(text, "request_duration_seconds", labels, &metrics->requests[route][status], time_bounds);
 		}
+}
+
+static void write_answers(struct text *text, const struct metrics *metrics)
+{
+	write_family(text, "response_bytes", "counter", "Bytes of the bodies of answers, by route.");
+	for (int route = 0; route < ROUTE_COUNT; route++)
+		text_printf(text, "stratus_response_bytes_total{route=\"%s\"} %llu\n", route_names[route],
+			    (unsigned long long)metrics->bytes[route]);
+	write_family(text, "problems", "counter", "Answers that are problems, by the end of their type.");
+	for (int kind = PROBLEM_NONE + 1; kind < PROBLEM_KIND_COUNT; kind++) {
+		unsigned long count = 0;
+		bool named = false; /* kinds may share a name: then the first of them has the sum */
+		for (int other = PROBLEM_NONE + 1; other < PROBLEM_KIND_COUNT; other++) {
+			const bool same = strcmp(problem_name((enum problem_kind)other), problem_name((enum problem_kind)kind)) == 0;
+			named |= same && other < kind;
+			count += same ? metrics->problems[other] : 0;
+		}
+		if (!named)
+			text_printf(text, "stratus_problems_total{type=\"%s\"} %lu\n", problem_name((enum problem_kind)kind), count);
+	}
+	write_family(text, "picture_pixels", "histogram", "Pixels of the pictures that were answered, layers counted apart.");
+	write_histogram(text, "picture_pixels", "", &metrics->pictures, pixel_bounds);
 }
 
 static void write_stages(struct text *text, const struct metrics *metrics)
@@ -171,7 +231,7 @@ static void write_stages(struct text *text, const struct metrics *metrics)
 	write_family(text, "stage_duration_seconds", "histogram", "Work of the stages of a render, those taken from memory left out.");
 	for (int i = 0; i < TIMING_COUNT; i++) {
 		snprintf(labels, sizeof labels, "stage=\"%s\"", timing_names[i]);
-		write_histogram(text, "stage_duration_seconds", labels, &metrics->stages[i]);
+		write_histogram(text, "stage_duration_seconds", labels, &metrics->stages[i], time_bounds);
 	}
 	write_family(text, "stage_reused", "counter", "Stages of a render that were taken from memory.");
 	for (int i = 0; i < TIMING_COUNT; i++)
@@ -180,8 +240,12 @@ static void write_stages(struct text *text, const struct metrics *metrics)
 
 static void write_queue(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
 {
+	write_family(text, "ready", "gauge", "1: renders are taken, as /readyz says it.");
+	text_printf(text, "stratus_ready %d\n", now->ready);
 	write_family(text, "queue_depth", "gauge", "Renders waiting, for their droplets or for the renderer.");
 	text_printf(text, "stratus_queue_depth %zu\n", now->queue_depth);
+	write_family(text, "queue_pixels", "gauge", "Pixels of those renders, layers counted apart.");
+	text_printf(text, "stratus_queue_pixels %.0f\n", now->queue_pixels);
 	write_family(text, "queue_limit", "gauge", "Renders that may wait for each.");
 	text_printf(text, "stratus_queue_limit %zu\n", now->queue_limit);
 	write_family(text, "requests_in_flight", "gauge", "Requests being answered, this one included.");
@@ -229,6 +293,16 @@ static void write_assets(struct text *text, const struct metrics_now *now)
 	text_printf(text, "stratus_asset_maps_bytes %llu\n", (unsigned long long)now->asset_map_bytes);
 }
 
+/* The read-back remembers nothing. */
+static void write_cache(struct text *text, const struct metrics_now *now)
+{
+	write_family(text, "gpu_memory_bytes", "gauge", "GPU memory of what a stage remembers.");
+	for (int stage = 0; stage < STAGE_READBACK; stage++)
+		text_printf(text, "stratus_gpu_memory_bytes{stage=\"%s\"} %zu\n", stage_names[stage], now->cache_bytes[stage]);
+	write_family(text, "gpu_memory_limit_bytes", "gauge", "GPU memory that the stages may keep together beyond the frame in work.");
+	text_printf(text, "stratus_gpu_memory_limit_bytes %zu\n", now->cache_limit);
+}
+
 static void write_label(struct text *text, const char *name, const char *value)
 {
 	text_printf(text, "%s=\"", name);
@@ -255,8 +329,31 @@ static void write_infos(struct text *text, const struct renderer_info *info)
 	text_add(text, "} 1\n");
 }
 
-static void write_process(struct text *text)
+static unsigned long open_descriptors(void)
 {
+	unsigned long count = 0;
+	DIR *directory = opendir("/proc/self/fd");
+	if (!directory)
+		return 0;
+	for (const struct dirent *entry; (entry = readdir(directory));)
+		count += *entry->d_name != '.';
+	closedir(directory);
+	return count - 1; /* the directory's own */
+}
+
+static void write_process(struct text *text, const struct metrics *metrics)
+{
+	struct rusage usage;
+	if (getrusage(RUSAGE_SELF, &usage) == 0) {
+		write_family(text, "process_cpu_seconds", "counter", "Processor time of the process.");
+		text_printf(text, "stratus_process_cpu_seconds_total %.3f\n",
+			    (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+				    (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec) * 1e-6);
+	}
+	write_family(text, "process_start_time_seconds", "gauge", "Unix time at which the process started.");
+	text_printf(text, "stratus_process_start_time_seconds %.0f\n", metrics->started_s);
+	write_family(text, "process_open_fds", "gauge", "Open file descriptors.");
+	text_printf(text, "stratus_process_open_fds %lu\n", open_descriptors());
 	unsigned long total = 0, resident = 0;
 	FILE *file = fopen("/proc/self/statm", "re");
 	if (!file)
@@ -279,13 +376,15 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	if (!copy)
 		return NULL;
 	write_requests(&text, copy);
+	write_answers(&text, copy);
 	write_stages(&text, copy);
 	write_queue(&text, copy, now);
 	write_tracings(&text, copy, now);
 	write_droplets(&text, &now->droplets);
 	write_assets(&text, now);
+	write_cache(&text, now);
 	write_infos(&text, now->info);
-	write_process(&text);
+	write_process(&text, copy);
 	text_add(&text, "# EOF\n");
 	free(copy);
 	return text_take(&text);

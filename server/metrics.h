@@ -6,6 +6,7 @@
 #define STRATUS_SERVER_METRICS_H
 
 #include "renderer/droplet_store.h"
+#include "server/problem.h"
 #include "server/server_timing.h"
 
 enum metrics_route {
@@ -34,8 +35,12 @@ struct metrics;
 struct metrics *metrics_create(void);
 void metrics_destroy(struct metrics *metrics);
 
-/* status: of HTTP; 499 when the client left before an answer. */
-void metrics_count_request(struct metrics *metrics, enum metrics_route route, unsigned status, double milliseconds);
+/* status: of HTTP; 499 when the client left before an answer. bytes: of the answer's body. */
+void metrics_count_request(struct metrics *metrics, enum metrics_route route, unsigned status, double milliseconds, uint64_t bytes);
+/* An answer that is a problem. */
+void metrics_count_problem(struct metrics *metrics, enum problem_kind kind);
+/* A picture that was answered, layers counted apart. */
+void metrics_count_picture(struct metrics *metrics, double pixels);
 /* The stages of an answered render. Stages taken from memory are counted apart: their zeros would hide what the work costs. */
 void metrics_count_timings(struct metrics *metrics, const struct timings *timings);
 void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection reason);
@@ -48,11 +53,14 @@ void metrics_count_tracing_end(struct metrics *metrics, enum metrics_end end);
 /* What is asked for at the moment of the scrape. info NULL: not ready yet. */
 struct metrics_now {
 	const struct renderer_info *info;
+	bool ready; /* as /readyz says it */
 	size_t queue_depth, queue_limit, requests_in_flight;
+	double queue_pixels;
 	size_t tracings_waiting, tracings_limit;
 	struct droplet_store_counts droplets;
 	size_t assets;
-	uint64_t asset_bytes, asset_map_bytes; /* on disk; decoded, in memory */
+	uint64_t asset_bytes, asset_map_bytes;        /* on disk; decoded, in memory */
+	size_t cache_bytes[STAGE_COUNT], cache_limit; /* on the GPU */
 };
 
 /* The caller frees; NULL when out of memory. */

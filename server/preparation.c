@@ -168,6 +168,11 @@ size_t preparation_depth(struct preparation *preparation)
 	return render_queue_depth(preparation->waiting);
 }
 
+double preparation_pixels(struct preparation *preparation)
+{
+	return render_queue_pixels(preparation->waiting);
+}
+
 double preparation_busy_ms(const struct preparation *preparation)
 {
 	double since = preparation->busy_since_ms;

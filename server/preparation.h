@@ -25,8 +25,9 @@ bool preparation_push(struct preparation *preparation, struct render_job *job);
 /* The renderer needs the job's tables no longer. Once or more for every job; any thread. */
 void preparation_release(struct preparation *preparation, struct render_job *job);
 
-/* Jobs waiting now, those in the render queue apart. Any thread. */
+/* Jobs waiting now, those in the render queue apart, and their pixels. Any thread. */
 size_t preparation_depth(struct preparation *preparation);
+double preparation_pixels(struct preparation *preparation);
 
 /* Milliseconds that the job in work has taken so far, 0 when idle, and those of a typical one lately, 0 before the first. Any thread. */
 double preparation_busy_ms(const struct preparation *preparation);

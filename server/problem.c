@@ -99,6 +99,11 @@ bool problem_mentions(const struct problem *problem, const char *pointer)
 	return false;
 }
 
+const char *problem_name(enum problem_kind kind)
+{
+	return kinds[kind].name;
+}
+
 unsigned problem_status(enum problem_kind kind)
 {
 	return kinds[kind].status;

@@ -64,6 +64,9 @@ bool problem_mentions(const struct problem *problem, const char *pointer);
 /* The HTTP status of a kind, 400..507. */
 unsigned problem_status(enum problem_kind kind);
 
+/* What `type` ends with: kinds may share one. */
+const char *problem_name(enum problem_kind kind);
+
 /* JSON text (free), NULL when out of memory. The request id is part of `instance`; retry_after_seconds 0: not said. */
 char *problem_to_json(const struct problem *problem, const char *request_id, unsigned retry_after_seconds);
 

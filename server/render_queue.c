@@ -11,6 +11,7 @@ struct render_queue {
 	pthread_cond_t changed;
 	struct render_job *first, **last;
 	size_t depth, limit;
+	double pixels;
 	bool closed;
 };
 
@@ -45,6 +46,13 @@ void render_queue_destroy(struct render_queue *queue)
 	free(queue);
 }
 
+static double pixels_of(const struct render_job *job)
+{
+	const struct scene_output *output = &job->scene->output;
+	const int layers = output->format == IMAGE_PNG ? 1 : __builtin_popcount(output->layers);
+	return job->directions ? 0 : (double)output->width * output->height * layers;
+}
+
 static void append(struct render_queue *queue, struct render_job *job)
 {
 	job->queued_ms = clock_now_ms();
@@ -52,6 +60,7 @@ static void append(struct render_queue *queue, struct render_job *job)
 	*queue->last = job;
 	queue->last = &job->next;
 	queue->depth++;
+	queue->pixels += pixels_of(job);
 	pthread_cond_signal(&queue->changed);
 }
 
@@ -82,6 +91,7 @@ static struct render_job *take(struct render_queue *queue, struct render_job **l
 	if (!*link)
 		queue->last = link;
 	queue->depth--;
+	queue->pixels -= pixels_of(job);
 	job->waited_ms += clock_now_ms() - job->queued_ms;
 	return job;
 }
@@ -121,4 +131,12 @@ size_t render_queue_depth(struct render_queue *queue)
 	size_t depth = queue->depth;
 	pthread_mutex_unlock(&queue->mutex);
 	return depth;
+}
+
+double render_queue_pixels(struct render_queue *queue)
+{
+	pthread_mutex_lock(&queue->mutex);
+	double pixels = queue->pixels;
+	pthread_mutex_unlock(&queue->mutex);
+	return pixels;
 }

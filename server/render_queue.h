@@ -64,7 +64,8 @@ struct render_job *render_queue_pop_wanted(struct render_queue *queue, render_jo
 
 void render_queue_close(struct render_queue *queue);
 
-/* Jobs waiting now. */
+/* Jobs waiting now, and the pixels that they ask for, layers counted apart. */
 size_t render_queue_depth(struct render_queue *queue);
+double render_queue_pixels(struct render_queue *queue);
 
 #endif

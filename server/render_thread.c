@@ -161,6 +161,11 @@ struct droplet_store *render_thread_droplets(const struct render_thread *thread)
 	return thread->droplets;
 }
 
+size_t render_thread_cache_bytes(const struct render_thread *thread, enum stage stage)
+{
+	return renderer_cache_bytes(thread->renderer, stage);
+}
+
 double render_thread_busy_ms(const struct render_thread *thread)
 {
 	double since = thread->busy_since_ms;

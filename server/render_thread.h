@@ -26,6 +26,9 @@ const struct renderer_info *render_thread_info(const struct render_thread *threa
 const struct kernel *render_thread_kernel(const struct render_thread *thread);
 struct droplet_store *render_thread_droplets(const struct render_thread *thread);
 
+/* Bytes of what a stage remembers on the GPU. Any thread, once the state has been RENDER_THREAD_READY and until render_thread_destroy. */
+size_t render_thread_cache_bytes(const struct render_thread *thread, enum stage stage);
+
 /* Milliseconds the running job has taken so far, 0 when idle. Any thread. */
 double render_thread_busy_ms(const struct render_thread *thread);
 

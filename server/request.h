@@ -7,6 +7,7 @@
 #ifndef STRATUS_SERVER_REQUEST_H
 #define STRATUS_SERVER_REQUEST_H
 
+#include "server/digest.h"
 #include "server/metrics.h"
 #include "server/problem.h"
 #include "server/text.h"
@@ -44,7 +45,9 @@ struct request {
 	struct text body;
 	struct problem problem;
 	struct timings timings;
-	unsigned status; /* answered; 0: not yet */
+	unsigned status;         /* answered; 0: not yet */
+	uint64_t bytes;          /* of the answer's body */
+	char scene[DIGEST_SIZE]; /* hash of the canonical scene that is asked for, for the log; empty: none */
 
 	/* What a route keeps with the request. */
 	void *work;

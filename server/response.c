@@ -11,8 +11,9 @@
 #include <string.h>
 #include <sys/socket.h>
 
-struct MHD_Response *response_create(char *data, size_t size)
+struct MHD_Response *response_create(struct request *request, char *data, size_t size)
 {
+	request->bytes = size;
 	struct MHD_Response *response = data ? MHD_create_response_from_buffer_with_free_callback(size, data, free) : NULL;
 	if (!response) {
 		log_error("response_create: out of memory");
@@ -83,8 +84,9 @@ static unsigned retry_after(const struct request *request)
 enum MHD_Result response_send_problem(struct request *request)
 {
 	unsigned retry = retry_after(request);
+	metrics_count_problem(request->service->metrics, request->problem.kind);
 	char *text = problem_to_json(&request->problem, request->id, retry);
-	struct MHD_Response *response = response_create(text, text ? strlen(text) : 0);
+	struct MHD_Response *response = response_create(request, text, text ? strlen(text) : 0);
 	response_set(response, "Content-Type", "application/problem+json");
 	response_set(response, "Cache-Control", CACHE_NONE);
 	if (retry) {
@@ -117,7 +119,7 @@ enum MHD_Result response_send_document(struct request *request, char *text, cons
 	size_t size = strlen(text);
 	entity_tag_of(text, size, tag);
 	bool known = entity_tag_matches(request_header(request, "If-None-Match"), tag);
-	struct MHD_Response *response = response_create(text, known ? 0 : size);
+	struct MHD_Response *response = response_create(request, text, known ? 0 : size);
 	if (!known)
 		response_set(response, "Content-Type", content_type);
 	response_set(response, "ETag", tag);
@@ -131,7 +133,7 @@ enum MHD_Result response_send_json(struct request *request, unsigned status, jso
 	json_decref(root);
 	if (status == MHD_HTTP_OK && strcmp(cache_control, CACHE_NONE) != 0)
 		return response_send_document(request, text, "application/json", cache_control);
-	struct MHD_Response *response = response_create(text, text ? strlen(text) : 0);
+	struct MHD_Response *response = response_create(request, text, text ? strlen(text) : 0);
 	response_set(response, "Content-Type", "application/json");
 	response_set(response, "Cache-Control", cache_control);
 	return response_send(request, status, response);
@@ -144,6 +146,7 @@ enum MHD_Result response_refuse_body(struct request *request, uint64_t limit)
 	char timing[SERVER_TIMING_SIZE];
 	format_timing(request, timing);
 	problem_set(&request->problem, PROBLEM_TOO_LARGE, "A body has at most %llu bytes.", (unsigned long long)limit);
+	metrics_count_problem(request->service->metrics, request->problem.kind);
 	char *body = problem_to_json(&request->problem, request->id, 0);
 	if (body && info) {
 		text_printf(&answer,
@@ -153,7 +156,7 @@ enum MHD_Result response_refuse_body(struct request *request, uint64_t limit)
 			    strlen(body), timing, request->id, body);
 		/* The answer is far smaller than a socket's buffer; a client that reads nothing gets nothing. */
 		if (!answer.failed && send(info->connect_fd, answer.data, answer.length, MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
-			request->status = problem_status(PROBLEM_TOO_LARGE);
+			request->status = problem_status(PROBLEM_TOO_LARGE), request->bytes = strlen(body);
 	}
 	free(body);
 	text_finish(&answer);

@@ -10,8 +10,8 @@
 #define CACHE_ASK  "no-cache"
 #define CACHE_NONE "no-store"
 
-/* Takes over malloc'd data (also on failure). NULL when out of memory. */
-struct MHD_Response *response_create(char *data, size_t size);
+/* The answer to a request. Takes over malloc'd data (also on failure). NULL when out of memory. */
+struct MHD_Response *response_create(struct request *request, char *data, size_t size);
 /* For a HEAD that is answered without computing, so that the length is unknown. */
 struct MHD_Response *response_create_unsized(void);
 void response_set(struct MHD_Response *response, const char *name, const char *value);

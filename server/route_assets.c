@@ -159,6 +159,7 @@ static enum MHD_Result send_file(struct request *request, const char *name)
 	}
 	const bool known = entity_tag_matches(condition.if_none_match, tag);
 	struct MHD_Response *response = response_of_file(&file, !known);
+	request->bytes = known ? 0 : file.bytes;
 	asset_file_close(&file);
 	response_set(response, "ETag", tag);
 	response_set(response, "Cache-Control", CACHE_ASK);

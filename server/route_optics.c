@@ -231,7 +231,7 @@ static enum MHD_Result finish(struct request *request)
 	case OPTICS_OK:
 		break;
 	}
-	struct MHD_Response *response = response_create(work->answer, strlen(work->answer));
+	struct MHD_Response *response = response_create(request, work->answer, strlen(work->answer));
 	work->answer = NULL;
 	return send_optics(request, MHD_HTTP_OK, response);
 }

@@ -118,6 +118,8 @@ static bool describe(struct render_work *work, const struct service *service)
 	work->location = text_take(&location);
 	text_printf(&tagged, "%s|%s", work->canonical ? work->canonical : "", service->pixel_version);
 	bool good = query && work->canonical && work->location && !tagged.failed;
+	if (work->canonical)
+		digest_of(work->canonical, strlen(work->canonical), work->request->scene);
 	if (good)
 		entity_tag_of(tagged.data, tagged.length, work->tag);
 	free(query);
@@ -173,10 +175,11 @@ static enum MHD_Result finish(struct request *request)
 	timings_add(&request->timings, TIMING_FIELD, work->decode_ms[0]);
 	timings_add(&request->timings, TIMING_SKY, work->decode_ms[1]); /* the ground is part of it */
 	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
-	struct MHD_Response *response = response_create((char *)work->image.data, work->image.size);
+	struct MHD_Response *response = response_create(request, (char *)work->image.data, work->image.size);
 	work->image.data = NULL;
 	enum MHD_Result result = send_image(request, MHD_HTTP_OK, response);
 	metrics_count_timings(metrics, &request->timings);
+	metrics_count_picture(metrics, (double)work->job.frame.width * work->job.frame.height * work->job.frame.layer_count);
 	return result;
 }
 

@@ -142,7 +142,7 @@ static enum MHD_Result finish(struct request *request)
 	timings_set(&request->timings, TIMING_SKY, work->job.light.timing.milliseconds);
 	request->timings.entry[TIMING_SKY].reused = work->job.light.timing.reused;
 	timings_set(&request->timings, TIMING_ENCODE, work->write_ms);
-	struct MHD_Response *response = response_create(work->answer, strlen(work->answer));
+	struct MHD_Response *response = response_create(request, work->answer, strlen(work->answer));
 	work->answer = NULL;
 	return send_light(request, MHD_HTTP_OK, response);
 }

@@ -38,14 +38,19 @@ enum MHD_Result route_metrics(struct request *request)
 	struct service *service = request->service;
 	struct metrics_now now = {
 		.info = service->ready ? render_thread_info(service->render_thread) : NULL,
+		.ready = service_state(service) == SERVICE_READY,
 		.queue_depth = service_queue_depth(service),
+		.queue_pixels = service_queue_pixels(service),
 		.queue_limit = (size_t)service->config->queue_length,
 		.requests_in_flight = service->in_flight,
 		.tracings_waiting = worker_pool_waiting(service->tracers),
 		.tracings_limit = SERVICE_TRACINGS_MAX,
+		.cache_limit = (size_t)service->config->cache_mb << 20,
 	};
 	asset_store_usage(service->assets, &now.assets, &now.asset_bytes);
 	now.asset_map_bytes = asset_maps_bytes(service->maps);
+	for (int stage = 0; stage < STAGE_COUNT && service->ready; stage++)
+		now.cache_bytes[stage] = render_thread_cache_bytes(service->render_thread, (enum stage)stage);
 	if (service->ready)
 		now.droplets = droplet_store_counts(render_thread_droplets(service->render_thread));
 	return response_send_document(request, metrics_format(service->metrics, &now),

@@ -187,6 +187,11 @@ size_t service_queue_depth(const struct service *service)
 	return render_queue_depth(service->queue) + (service->ready ? preparation_depth(service->preparation) : 0);
 }
 
+double service_queue_pixels(const struct service *service)
+{
+	return render_queue_pixels(service->queue) + (service->ready ? preparation_pixels(service->preparation) : 0);
+}
+
 static unsigned whole_seconds(double milliseconds)
 {
 	double seconds = milliseconds * 1e-3;

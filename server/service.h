@@ -68,6 +68,7 @@ enum service_state service_state(const struct service *service);
 
 /* Renders waiting for their droplets or for the renderer. Any thread. */
 size_t service_queue_depth(const struct service *service);
+double service_queue_pixels(const struct service *service);
 
 /* A guess at when the queue has room again, from 1. Any thread. */
 unsigned service_retry_seconds(const struct service *service);

@@ -96,6 +96,7 @@ def run(*flags, **environment):
         ["--queue-length", "many"],
         ["--pass", "quick"],
         ["--log-level=loud"],
+        ["--log-format=xml"],
         ["--device", "1e3"],
         ["--workers=-1"],
         ["--droplets-mb", "0"],
@@ -131,7 +132,7 @@ def test_settings_are_printed():
 
 def test_help_and_version():
     text = run("--help").stdout
-    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb droplets-mb droplets-disk-mb asset-max-mb asset-count assets-disk-mb assets-mb log-level".split():
+    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb droplets-mb droplets-disk-mb asset-max-mb asset-count assets-disk-mb assets-mb log-level log-format".split():
         assert "--" + flag in text and "STRATUS_" + flag.upper().replace("-", "_") in text
     assert run("--version").stdout.startswith("stratus ")
 
@@ -161,7 +162,7 @@ def test_log_of_a_request_that_cannot_be_read(start_daemon):
     daemon = start_daemon()
     with socket.create_connection(("127.0.0.1", daemon.port), timeout=60) as client:
         client.sendall(b"GET /somewhere HTTP/1.1\r\nHos")
-    assert wait_for(lambda: " - /somewhere 499 " in daemon.log.read_text())
+    assert wait_for(lambda: " method=- path=/somewhere status=499 " in daemon.log.read_text())
 
 
 def test_ipv6(tmp_path):

@@ -56,6 +56,27 @@ static void keys_tell_apart(void **state)
 	cache_destroy(NULL);
 }
 
+static void bytes_are_counted_for_their_owner(void **state)
+{
+	(void)state;
+	struct cache *cache = cache_create(100);
+	cache_begin_frame(cache);
+	keep(cache, 1, 30);
+	cache_set_owner(cache, 3);
+	keep(cache, 2, 40);
+	keep(cache, 3, 5);
+	assert_int_equal(cache_owned_bytes(cache, 0), 30);
+	assert_int_equal(cache_owned_bytes(cache, 3), 45);
+	/* What is dropped is taken from its own owner, whoever keeps at the moment. */
+	cache_begin_frame(cache);
+	keep(cache, 4, 49);
+	assert_int_equal(destroyed[1], 1);
+	assert_int_equal(cache_owned_bytes(cache, 0), 0);
+	assert_int_equal(cache_owned_bytes(cache, 3), 94);
+	assert_int_equal(cache_bytes(cache), 94);
+	cache_destroy(cache);
+}
+
 static void least_recently_used_goes_first(void **state)
 {
 	(void)state;
@@ -100,6 +121,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(keys_tell_apart),
+		cmocka_unit_test(bytes_are_counted_for_their_owner),
 		cmocka_unit_test(least_recently_used_goes_first),
 		cmocka_unit_test(a_frame_holds_what_it_uses),
 	};

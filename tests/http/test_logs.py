@@ -1,0 +1,139 @@
+"""One line a request, as text or JSON."""
+import json
+import re
+import socket
+
+import pytest
+
+from conftest import wait_for
+
+SMALL = {"output": {"width": 32, "height": 24}}
+MEMBERS = {"time", "level", "event", "id", "method", "path", "status", "duration_ms", "bytes", "stages_ms", "reused"}
+
+
+def parse_text(line):
+    """The members of a line of text, in the types of the JSON form."""
+    stamp, level, event, *rest = re.findall(r'(?:[^\s"]|"(?:[^"\\]|\\.)*")+', line)
+    record = {"time": stamp, "level": level, "event": event, "stages_ms": {}, "reused": []}
+    for pair in rest:
+        name, value = pair.split("=", 1)
+        stage = re.fullmatch(r"([a-z]+)_ms", name)
+        if stage and stage[1] != "duration":
+            milliseconds, _, reused = value.partition(",")
+            record["stages_ms"][stage[1]] = float(milliseconds)
+            record["reused"] += [stage[1]] if reused else []
+        elif name in ("status", "bytes", "duration_ms"):
+            record[name] = json.loads(value)
+        else:
+            record[name] = json.loads(value) if value.startswith('"') else value
+    return record
+
+
+def records(daemon, form):
+    lines = daemon.log.read_text().splitlines()
+    if form == "json":
+        return [json.loads(line) for line in lines]
+    return [parse_text(line) for line in lines if " request id=" in line]
+
+
+def requests_of(daemon, form):
+    return [record for record in records(daemon, form) if record.get("event") == "request"]
+
+
+def wait_for_requests(daemon, form, count):
+    assert wait_for(lambda: len(requests_of(daemon, form)) >= count)
+    return requests_of(daemon, form)
+
+
+@pytest.mark.parametrize("form", ["json", "text"])
+def test_exactly_one_line_a_request(start_daemon, form):
+    """Whatever the answer is: its line has the status and the bytes that the client saw."""
+    daemon = start_daemon("--log-format", form, "--log-level", "debug")
+    calls = [
+        ("POST", "/v1/render", json.dumps(SMALL), {"Content-Type": "application/json"}),
+        ("POST", "/v1/render", "{", {"Content-Type": "application/json"}),
+        ("POST", "/v1/render", b" " * (2 << 20), {"Content-Type": "application/json"}),
+        ("GET", "/v1/render?output.width=32&output.height=24", None, {}),
+        ("GET", "/v1/render?output.width=32&output.height=24", None, {"If-None-Match": "*"}),
+        ("HEAD", "/v1/render?output.width=32&output.height=24", None, {}),
+        ("GET", "/v1/optics", None, {}),
+        ("GET", "/v1/slab?optical_thickness=8&sun_zenith_deg=60", None, {}),
+        ("GET", "/v1/sky?view_zenith_deg=0&azimuth_deg=0", None, {}),
+        ("GET", "/v1/sun", None, {}),
+        ("GET", "/v1/presets", None, {}),
+        ("GET", "/v1/assets", None, {}),
+        ("GET", "/", None, {}),
+        ("HEAD", "/openapi.yaml", None, {}),
+        ("GET", '/no"thing%20here', None, {}),
+        ("DELETE", "/v1/render", None, {}),
+        ("GET", "/healthz", None, {}),
+        ("GET", "/readyz", None, {}),
+        ("GET", "/metrics", None, {}),
+    ]
+    answers = {}
+    for i, (method, target, body, headers) in enumerate(calls):
+        answers[f"call-{i}"] = daemon.request(method, target, body, {**headers, "X-Request-Id": f"call-{i}"})
+    found = wait_for_requests(daemon, form, len(calls))
+    assert sorted(record["id"] for record in found) == sorted(answers)
+    for i, (method, target, _, _) in enumerate(calls):
+        (record,) = [r for r in found if r["id"] == f"call-{i}"]
+        answer = answers[record["id"]]
+        assert set(record) - {"scene"} == MEMBERS
+        assert record["method"] == method and record["path"] == target.split("?")[0]
+        assert record["status"] == answer.status
+        assert record["bytes"] == len(answer.body), target
+        assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", record["time"])
+        assert record["level"] == ("debug" if target in ("/healthz", "/readyz", "/metrics") else "info")
+        assert record["duration_ms"] >= 0
+
+
+@pytest.mark.parametrize("form", ["json", "text"])
+def test_line_of_a_picture(start_daemon, form):
+    daemon = start_daemon("--log-format", form)
+    scenes = [SMALL, SMALL, {**SMALL, "clouds": {"seed": 9}}, {"output": {"height": 24, "width": 32}, "sun": {"elevation_deg": 35}}]
+    answers = [daemon.render(scene) for scene in scenes]
+    lines = wait_for_requests(daemon, form, len(scenes))
+    for line, answer in zip(lines, answers):
+        timing = answer.timing
+        del timing["total"]
+        assert {name: float(stage["dur"]) for name, stage in timing.items()} == line["stages_ms"]
+        assert [name for name, stage in timing.items() if stage.get("desc") == '"reused"'] == line["reused"]
+        assert re.fullmatch(r"[0-9a-f]{32}", line["scene"])
+        assert line["duration_ms"] >= sum(line["stages_ms"].values()) - 2
+    hashes = [line["scene"] for line in lines]
+    assert hashes[0] == hashes[1] == hashes[3] != hashes[2]
+
+
+def test_every_line_is_an_object(start_daemon):
+    """From the first to the last, of requests that cannot be read and of clients that leave too."""
+    daemon = start_daemon("--log-format=json", "--log-level=debug")
+    with socket.create_connection(("127.0.0.1", daemon.port), timeout=60) as client:
+        client.sendall(b"GET /some\xff\xc3\xa9\"where HTTP/1.1\r\nHos")
+    wait_for_requests(daemon, "json", 1)
+    daemon.render({**SMALL, "ground": {"map": "none\n\"x"}})
+    assert daemon.stop() == 0
+    found = records(daemon, "json")
+    for record in found:
+        assert record["level"] in ("error", "warning", "info", "debug")
+        assert ("message" in record) != ("event" in record)
+    (line,) = [r for r in found if r.get("status") == 499]
+    assert line["path"] == '/some\ufffdé"where' and line["id"] == line["method"] == ""
+    assert found[-1]["message"].startswith("SIGTERM")
+
+
+def test_lines_are_cut_and_not_forged(start_daemon):
+    daemon = start_daemon()
+    daemon.get("/" + "x" * 3000)
+    daemon.get("/a%0a2026-01-01T00:00:00.000Z%20info%20forged", X_Request_Id="evil\tid=1")
+    found = wait_for_requests(daemon, "text", 2)
+    assert len(found) == 2
+    assert found[0]["path"] == "/" + "x" * 199
+    assert found[1]["path"].startswith("/a%0a2026")
+    assert re.fullmatch(r"[0-9a-f]{32}", found[1]["id"])
+
+
+def test_probes_are_quiet(start_daemon):
+    daemon = start_daemon()
+    for target in ("/healthz", "/readyz", "/metrics", "/v1/presets"):
+        daemon.get(target)
+    assert [record["path"] for record in wait_for_requests(daemon, "text", 1)] == ["/v1/presets"]

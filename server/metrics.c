@@ -354,6 +354,11 @@ static void write_process(struct text *text, const struct metrics *metrics)
 	text_printf(text, "stratus_process_start_time_seconds %.0f\n", metrics->started_s);
 	write_family(text, "process_open_fds", "gauge", "Open file descriptors.");
 	text_printf(text, "stratus_process_open_fds %lu\n", open_descriptors());
+	struct rlimit limit;
+	if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
+		write_family(text, "process_max_fds", "gauge", "File descriptors that may be open.");
+		text_printf(text, "stratus_process_max_fds %llu\n", (unsigned long long)limit.rlim_cur);
+	}
 	unsigned long total = 0, resident = 0;
 	FILE *file = fopen("/proc/self/statm", "re");
 	if (!file)

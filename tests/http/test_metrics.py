@@ -1,5 +1,6 @@
 """What /metrics says, read by Prometheus's own parser of OpenMetrics, and against what was asked for."""
 import concurrent.futures
+import resource
 import time
 
 from prometheus_client.openmetrics.parser import text_string_to_metric_families
@@ -126,6 +127,7 @@ def test_process(start_daemon):
     after = Scrape(daemon)
     assert after("ready") == 1
     assert after("process_open_fds") >= before("process_open_fds") + len(held)
+    assert after("process_max_fds") == resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     assert after("process_cpu_seconds_total") > before("process_cpu_seconds_total") > 0
     assert 0 <= time.time() - after("process_start_time_seconds") < (600 if SANITIZED else 120)
     for connection in held:

@@ -76,6 +76,14 @@ static void *option_at(const struct option *option, struct config *config)
 	return (char *)config + option->offset;
 }
 
+bool config_knows_variable(const char *name, size_t length)
+{
+	for (const struct option *option = options; option->name; option++)
+		if (strlen(option->variable) == length && strncmp(option->variable, name, length) == 0)
+			return true;
+	return false;
+}
+
 static bool set_integer(const struct option *option, const char *text, int *target)
 {
 	char *end;
@@ -139,9 +147,9 @@ static bool set_option(const struct option *option, const char *text, const char
 	return false;
 }
 
-static void print_value(const struct option *option, struct config *config)
+static void print_value(const struct option *option, const struct config *config)
 {
-	const void *value = option_at(option, config);
+	const void *value = (const char *)config + option->offset;
 	const char *text;
 	switch (option->type) {
 	case OPTION_TEXT:
@@ -160,7 +168,7 @@ static void print_value(const struct option *option, struct config *config)
 	}
 }
 
-static void print_config(struct config *config)
+void config_print(const struct config *config)
 {
 	for (const struct option *option = options; option->name; option++) {
 		printf("%s=", option->variable);
@@ -169,7 +177,7 @@ static void print_config(struct config *config)
 	}
 }
 
-static void print_help(struct config *defaults)
+static void print_help(const struct config *defaults)
 {
 	printf("stratusd renders physically based cloudy skies on request, over HTTP.\n\nusage: stratusd [FLAG...]\n\n");
 	for (const struct option *option = options; option->name; option++) {
@@ -180,6 +188,7 @@ static void print_help(struct config *defaults)
 		printf("]\n");
 	}
 	printf("  --print-config           print the settings as environment variables and exit\n"
+	       "  --check-config           print them, look whether the daemon could start so, and exit: 0 yes, 2 no\n"
 	       "  --version                print the version and exit\n"
 	       "  --help                   print this and exit\n");
 }
@@ -243,7 +252,7 @@ static bool read_flag(int argc, char **argv, int *index, struct config *config)
 
 enum config_result config_parse(int argc, char **argv, struct config *config)
 {
-	bool print = false;
+	bool print = false, check = false;
 	set_defaults(config);
 	if (!read_environment(config))
 		return CONFIG_BAD;
@@ -260,11 +269,16 @@ enum config_result config_parse(int argc, char **argv, struct config *config)
 		if (strcmp(argv[i], "--print-config") == 0) {
 			print = true;
 			i++;
+		} else if (strcmp(argv[i], "--check-config") == 0) {
+			check = true;
+			i++;
 		} else if (!read_flag(argc, argv, &i, config)) {
 			return CONFIG_BAD;
 		}
 	}
+	if (check)
+		return CONFIG_CHECK;
 	if (print)
-		print_config(config);
+		config_print(config);
 	return print ? CONFIG_DONE : CONFIG_RUN;
 }

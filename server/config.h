@@ -29,10 +29,17 @@ struct config {
 	char state_dir_buffer[4096]; /* holds the default of state_dir */
 };
 
-enum config_result { CONFIG_RUN, CONFIG_DONE, CONFIG_BAD };
+enum config_result { CONFIG_RUN, CONFIG_DONE, CONFIG_CHECK, CONFIG_BAD };
 
-/* Reads environment and flags. CONFIG_DONE: --help, --version or --print-config was answered on standard output. CONFIG_BAD: standard error
- * says what is wrong. Strings point into argv and the environment. Main thread, before others exist. */
+/* Reads environment and flags. CONFIG_DONE: --help, --version or --print-config was answered on standard output. CONFIG_CHECK:
+ * --check-config is asked for. CONFIG_BAD: standard error says what is wrong. Strings point into argv and the environment. Main thread,
+ * before others exist. */
 enum config_result config_parse(int argc, char **argv, struct config *config);
+
+/* Prints the settings as environment variables on standard output. */
+void config_print(const struct config *config);
+
+/* Is this (length characters) the variable of a setting? */
+bool config_knows_variable(const char *name, size_t length);
 
 #endif

@@ -7,6 +7,7 @@
 #include "server/response.h"
 #include "server/routes.h"
 
+#include <errno.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <stdio.h>
@@ -180,6 +181,27 @@ static struct addrinfo *resolve(const char *listen, char *host, size_t size)
 		return NULL;
 	}
 	return addresses;
+}
+
+bool http_can_listen(const char *listen)
+{
+	char host[256];
+	struct addrinfo *address = resolve(listen, host, sizeof host);
+	if (!address)
+		return false;
+	const int fd = socket(address->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0), reuse = 1;
+	if (fd >= 0)
+		setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &reuse, sizeof reuse);
+	const bool bound = fd >= 0 && bind(fd, address->ai_addr, address->ai_addrlen) == 0;
+	const int error = errno;
+	if (fd >= 0)
+		close(fd);
+	freeaddrinfo(address);
+	if (!bound && error == EADDRINUSE)
+		log_warning("--listen %s: another process listens there now", listen);
+	else if (!bound)
+		log_error("--listen %s: %s", listen, strerror(error));
+	return bound || error == EADDRINUSE;
 }
 
 static struct MHD_Daemon *start_daemon(struct service *service, const struct addrinfo *address)

@@ -4,6 +4,9 @@
 
 #include "server/service.h"
 
+/* Can this process listen on an address of --listen? Yes, too, when another one does. false and a log line when not. */
+bool http_can_listen(const char *listen);
+
 /* Listens on config->listen and starts the HTTP threads; sets service->daemon, host and port. false and a log line on failure. */
 bool http_start(struct service *service);
 

@@ -16,14 +16,21 @@ static bool can_write(const char *directory)
 	return snprintf(inside, sizeof inside, "%s/.", directory) < (int)sizeof inside && access(inside, W_OK | X_OK) == 0;
 }
 
-static bool beside_program(char path[static PATH_MAX])
+static const char *const places[] = {"mie.kernel", "../share/stratus/mie.kernel"}; /* seen from the running program */
+
+/* The first of the places where something is. */
+static bool near_program(char path[static PATH_MAX])
 {
 	ssize_t length = readlink("/proc/self/exe", path, PATH_MAX - 1);
 	if (length <= 0)
 		return false;
 	path[length] = '\0';
 	char *name = strrchr(path, '/') + 1;
-	return snprintf(name, (size_t)(PATH_MAX - (name - path)), "mie.kernel") < PATH_MAX - (name - path);
+	const size_t room = (size_t)(PATH_MAX - (name - path));
+	for (size_t i = 0; i < sizeof places / sizeof *places; i++)
+		if (snprintf(name, room, "%s", places[i]) < (int)room && access(path, R_OK) == 0)
+			return true;
+	return false;
 }
 
 static void report_progress(void *context, double done)
@@ -48,7 +55,7 @@ struct kernel *kernel_file_open(const char *path, const char *state_dir)
 	struct kernel *kernel = NULL;
 	if (path)
 		kernel = kernel_load(path);
-	else if (beside_program(buffer) && access(buffer, R_OK) == 0)
+	else if (near_program(buffer))
 		kernel = kernel_load(buffer);
 	if (kernel)
 		return kernel;
@@ -66,4 +73,20 @@ struct kernel *kernel_file_open(const char *path, const char *state_dir)
 		return NULL;
 	}
 	return generate(buffer);
+}
+
+static bool is_kernel(const char *path)
+{
+	struct kernel *kernel = access(path, R_OK) == 0 ? kernel_load(path) : NULL;
+	kernel_destroy(kernel);
+	return kernel != NULL;
+}
+
+bool kernel_file_find(const char *path, const char *state_dir, char found[static PATH_MAX])
+{
+	if (path)
+		return snprintf(found, PATH_MAX, "%s", path) < PATH_MAX && is_kernel(path);
+	if (near_program(found) && is_kernel(found))
+		return true;
+	return snprintf(found, PATH_MAX, "%s/mie.kernel", state_dir) < PATH_MAX && is_kernel(found);
 }

@@ -1,12 +1,17 @@
 /* stratusd: settings, signals, and the life of the service. */
 #include "renderer/log.h"
+#include "server/config_check.h"
 #include "server/service.h"
+#include "server/supervisor.h"
 
+#include <errno.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 #include <unistd.h>
+
+enum { EXIT_BAD_CONFIG = 2 };
 
 /* The signals that end the daemon, blocked in all threads and fetched by the main thread. */
 static sigset_t block_signals(void)
@@ -39,6 +44,24 @@ static bool wait_until_ready(struct service *service, const sigset_t *signals)
 	return state == SERVICE_READY;
 }
 
+/* Serves until a signal ends it. The supervisor hears of the daemon as long as a restart would not help; then it makes that restart. */
+static int wait_for_signal(const struct service *service, const sigset_t *signals)
+{
+	const int interval_ms = supervisor_interval_ms();
+	const struct timespec interval = {.tv_sec = interval_ms / 1000, .tv_nsec = interval_ms % 1000 * 1000000L};
+	int number;
+	while ((number = interval_ms ? sigtimedwait(signals, NULL, &interval) : sigwaitinfo(signals, NULL)) < 0)
+		if (errno == EAGAIN && service_state(service) != SERVICE_FAILED)
+			supervisor_tell("WATCHDOG=1");
+	return number;
+}
+
+static void set_log(const struct config *config)
+{
+	log_set_level((enum log_level)config->log_level);
+	log_set_format((enum log_format)config->log_format);
+}
+
 int main(int argc, char **argv)
 {
 	struct config config;
@@ -46,19 +69,23 @@ int main(int argc, char **argv)
 	case CONFIG_DONE:
 		return EXIT_SUCCESS;
 	case CONFIG_BAD:
-		return 2;
+		return EXIT_BAD_CONFIG;
+	case CONFIG_CHECK:
+		set_log(&config);
+		return config_check(&config) ? EXIT_SUCCESS : EXIT_BAD_CONFIG;
 	case CONFIG_RUN:
 		break;
 	}
-	log_set_level((enum log_level)config.log_level);
-	log_set_format((enum log_format)config.log_format);
+	set_log(&config);
 	sigset_t signals = block_signals();
 	struct service *service = service_create(&config);
 	bool ready = service && wait_until_ready(service, &signals);
 	if (ready) {
 		printf("stratusd listening on http://%s:%u\n", service->host, service->port);
 		fflush(stdout);
-		int number = sigwaitinfo(&signals, NULL);
+		supervisor_tell("READY=1\nSTATUS=Renders are taken.");
+		int number = wait_for_signal(service, &signals);
+		supervisor_tell("STOPPING=1\nSTATUS=Finishing accepted work.");
 		log_info("%s: finishing accepted work", number == SIGINT ? "SIGINT" : "SIGTERM");
 	}
 	service_destroy(service);

@@ -34,8 +34,8 @@ static void strings_are_escaped(void **state)
 static void what_is_no_utf8_is_replaced(void **state)
 {
 	(void)state;
-	static const char *const bad[] = {"\xff",         "\xc3",         "\xc0\xaf",         "\xe0\x80\xaf",
-					  "\xed\xa0\x80", "\xe2\x82",     "\xf4\x90\x80\x80", "\xf0\x80\x80\x80",
+	static const char *const bad[] = {"\xff",         "\xc3",        "\xc0\xaf",         "\xe0\x80\xaf",
+					  "\xed\xa0\x80", "\xe2\x82",    "\xf4\x90\x80\x80", "\xf0\x80\x80\x80",
 					  "\xf5\x80",     "\x80\x80\x80"};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		char expected[64] = "\"";

@@ -24,7 +24,7 @@ COPY --from=build /src/build/stratus-image.so /usr/local/lib/stratus/
 COPY --from=build /src/build/mie.kernel /usr/local/share/stratus/
 COPY --from=build /src/LICENSE /usr/share/doc/stratus/
 
-ARG VERSION=0.1.0
+ARG VERSION=0.3.0
 ARG REVISION=
 ARG CREATED=
 LABEL org.opencontainers.image.title="stratus" \

@@ -3,6 +3,7 @@
 # make demo   four pictures into out/, with their timings
 # make validate   measures the bounds of optics and radiosity and draws the paper's figures into docs/validation/, some minutes
 # make gallery   draws the pictures of docs/gallery
+# make install   puts programs, manual and systemd unit below PREFIX (/usr/local), all below DESTDIR; make uninstall takes them away
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
 
 SHELL := /bin/bash
@@ -26,7 +27,7 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
 	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr clang-format procps \
-	python3-prometheus-client
+	python3-prometheus-client mandoc systemd
 VALIDATE_PACKAGES := gnuplot-nox
 GALLERY_PACKAGES := imagemagick
 
@@ -51,7 +52,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel run test demo gallery validate unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall run test demo gallery validate unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -137,6 +138,33 @@ $(B)/tests/test_exchange: $(call obj,tests/validate/squares.c)
 $(B)/tests/test_sky_light: $(call obj,tests/validate/air_photons.c)
 
 -include $(shell find $(B) -name '*.d' 2>/dev/null)
+
+# --- manual and installation -------------------------------------------------------------------------------------------------
+man: $(B)/stratusd.8 $(B)/stratus.1
+$(B)/%: ops/man/%.in scripts/manual.sh $(B)/stratusd $(B)/stratus
+	scripts/manual.sh $(B)/$(basename $*) $< >$@
+
+PREFIX ?= /usr/local
+SYSCONFDIR ?= /etc/stratus
+UNITDIR ?= $(PREFIX)/lib/systemd/system
+MANDIR = $(PREFIX)/share/man
+INSTALLED = $(PREFIX)/bin/stratusd $(PREFIX)/bin/stratus $(PREFIX)/lib/stratus/stratus-image.so \
+	$(addprefix $(PREFIX)/share/stratus/,mie.kernel grafana-dashboard.json prometheus-alerts.yml) \
+	$(MANDIR)/man8/stratusd.8 $(MANDIR)/man1/stratus.1 $(UNITDIR)/stratusd.service
+
+# The operator's settings are left as they are, by uninstall too.
+install: all man
+	install -d $(addprefix $(DESTDIR),$(sort $(dir $(INSTALLED))) $(SYSCONFDIR))
+	install -m 755 $(B)/stratusd $(B)/stratus $(DESTDIR)$(PREFIX)/bin
+	install -m 644 $(B)/stratus-image.so $(DESTDIR)$(PREFIX)/lib/stratus
+	install -m 644 build/mie.kernel ops/grafana-dashboard.json ops/prometheus-alerts.yml $(DESTDIR)$(PREFIX)/share/stratus
+	install -m 644 $(B)/stratusd.8 $(DESTDIR)$(MANDIR)/man8
+	install -m 644 $(B)/stratus.1 $(DESTDIR)$(MANDIR)/man1
+	sed 's|@BINDIR@|$(PREFIX)/bin|; s|@SYSCONFDIR@|$(SYSCONFDIR)|' ops/stratusd.service | \
+		install -m 644 /dev/stdin $(DESTDIR)$(UNITDIR)/stratusd.service
+	test -e $(DESTDIR)$(SYSCONFDIR)/stratusd.env || install -m 640 ops/stratusd.env $(DESTDIR)$(SYSCONFDIR)/stratusd.env
+uninstall:
+	rm -f $(addprefix $(DESTDIR),$(INSTALLED))
 
 # --- what people type ----------------------------------------------------------------------------------------------------------
 packages:

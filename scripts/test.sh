@@ -104,6 +104,7 @@ if [ -n "$SAN" ]; then
 	run_pytest tests/http
 else
 	run_pytest tests/http tests/client
+	run_pytest tests/ops
 	run_format
 	[ "${STRATUS_QUICK:-0}" = 1 ] || run_sanitized
 fi

@@ -9,7 +9,8 @@ COPY Makefile ./
 COPY scripts scripts
 RUN make packages && rm -rf /var/lib/apt/lists/*
 COPY . .
-RUN make -j"$(nproc)" programs && make kernel && strip build/stratusd build/stratus build/stratus-image.so
+RUN make -j"$(nproc)" programs && make install DESTDIR=/out PREFIX=/usr/local \
+	&& strip /out/usr/local/bin/* /out/usr/local/lib/stratus/*.so
 
 FROM debian:12-slim
 # libegl1 is libglvnd's: it finds NVIDIA's EGL where the container runtime brings it, else Mesa's.
@@ -19,9 +20,7 @@ RUN apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-ins
 	&& rm -rf /var/lib/apt/lists/* \
 	&& useradd --uid 10001 --user-group --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin stratus \
 	&& install -d -o stratus -g stratus /var/lib/stratus
-COPY --from=build /src/build/stratusd /src/build/stratus /usr/local/bin/
-COPY --from=build /src/build/stratus-image.so /usr/local/lib/stratus/
-COPY --from=build /src/build/mie.kernel /usr/local/share/stratus/
+COPY --from=build /out/usr/local/ /usr/local/
 COPY --from=build /src/LICENSE /usr/share/doc/stratus/
 
 ARG VERSION=0.3.0
@@ -37,7 +36,7 @@ LABEL org.opencontainers.image.title="stratus" \
 
 ENV STRATUS_LISTEN=0.0.0.0:8080 \
 	STRATUS_STATE_DIR=/var/lib/stratus \
-	STRATUS_KERNEL=/usr/local/share/stratus/mie.kernel \
+	STRATUS_LOG_FORMAT=json \
 	NVIDIA_DRIVER_CAPABILITIES=graphics,compute,utility
 USER 10001:10001
 VOLUME /var/lib/stratus

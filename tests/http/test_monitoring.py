@@ -186,3 +186,29 @@ def test_expressions_of_the_dashboard(promtool, tmp_path):
     path = tmp_path / "dashboard.yml"
     path.write_text(yaml.safe_dump({"groups": [{"name": "dashboard", "rules": rules}]}))
     assert f"SUCCESS: {len(expressions)} rules found" in run(promtool, "check", "rules", path)
+
+
+def test_scrape_configuration(promtool, tmp_path):
+    """The scrape configuration of the documentation is one."""
+    text = (ROOT / "docs" / "operations.md").read_text()
+    (example,) = re.findall(r"```yaml\n(scrape_configs:.*?)```", text, re.S)
+    path = tmp_path / "prometheus.yml"
+    path.write_text(example.replace("/etc/prometheus/rules", str(OPS)))
+    assert "SUCCESS" in run(promtool, "check", "config", path)
+    assert "prometheus-alerts.yml" in example
+
+
+def test_documentation_names_what_is_exported(exported):
+    """The page on operation has every family, every alert, and nothing else."""
+    page = (ROOT / "docs" / "operations.md").read_text()
+    table = re.search(r"\| series .*?\n\n", page, re.S)[0]
+    named = {}
+    for name, labels in re.findall(r"`([a-z_]+)(?:\{([a-z,]+)\})?`", "".join(row.split("|")[1] for row in table.strip().splitlines()[2:])):
+        named["stratus_" + name] = set(labels.split(",")) if labels else set()
+    families = {}
+    for name, labels in exported.items():
+        if name.startswith("stratus_"):
+            families.setdefault(re.sub(r"_(bucket|count|sum)$", "", name), set()).update(set(labels) - {"le"})
+    assert named == families
+    rows = re.search(r"\| alert .*?\n\n", page, re.S)[0]
+    assert set(re.findall(r"\bStratus[A-Z]\w+", rows)) == {rule["alert"] for rule in alerts()}

@@ -17,6 +17,7 @@ items() {
 # Of stratusd: below the text of a flag are its variable and its default.
 options() {
 	# The default of the state directory is that of whoever runs it.
+	# shellcheck disable=SC2016
 	env -i HOME='$HOME' "$program" --help | sed '1,/^usage/d' | escape | items |
 		sed -E 's/^ +(STRATUS_[A-Z_]+) \[(.*)\]$/.Pq Ev \1 , default \2/; s/, default $/, no default/; /^$/d' |
 		sed -E 's/^(\.Pq .*, default )(.+)$/\1Ql \2/'
@@ -24,7 +25,8 @@ options() {
 
 # Of stratus: a section for each command, with its summary, its remarks and its options.
 command_section() {
-	local help=$("$program" "$1" --help | escape)
+	local help
+	help=$("$program" "$1" --help | escape)
 	echo ".Ss $(sed -n '1s/^usage: //p' <<<"$help")"
 	sed '1,2d' <<<"$help" | items | awk '
 		/^\.It / && !list { print ".Bl -tag -width Ds"; list = 1 }

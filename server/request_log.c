@@ -7,7 +7,7 @@
 
 enum { PATH_LOGGED = 200 };
 
-/* A request may carry a probe's name in its route alone: they come every few seconds and say nothing. */
+/* Probes and scrapes come every few seconds and say nothing. */
 static enum log_level level_of(const struct request *request)
 {
 	const enum metrics_route route = request->route ? request->route->metrics : ROUTE_OTHER;

@@ -4,6 +4,7 @@
 # make validate   measures the bounds of optics and radiosity and draws the paper's figures into docs/validation/, some minutes
 # make gallery   draws the pictures of docs/gallery
 # make install   puts programs, manual and systemd unit below PREFIX (/usr/local), all below DESTDIR; make uninstall takes them away
+# make image     builds the container image and renders a picture with it
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
 
 SHELL := /bin/bash
@@ -52,7 +53,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel man install uninstall run test demo gallery validate unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall image run test demo gallery validate unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -165,6 +166,10 @@ install: all man
 	test -e $(DESTDIR)$(SYSCONFDIR)/stratusd.env || install -m 640 ops/stratusd.env $(DESTDIR)$(SYSCONFDIR)/stratusd.env
 uninstall:
 	rm -f $(addprefix $(DESTDIR),$(INSTALLED))
+
+# The container image, built and tried: by docker or podman, else (as root) by buildah over a base of debootstrap.
+image:
+	scripts/image.sh out/image
 
 # --- what people type ----------------------------------------------------------------------------------------------------------
 packages:

@@ -132,3 +132,32 @@ def test_versions_agree(prefix):
     assert run(prefix / "bin/stratus", "--version").stdout == version
     number = version.split()[1]
     assert re.search(r"^ARG VERSION=(.*)$", (ROOT / "Dockerfile").read_text(), re.M)[1] == number
+
+
+# --- the image ---------------------------------------------------------------------------------------------------------------------
+
+
+def needed(path):
+    """Sonames that the program or module itself asks for."""
+    return re.findall(r"NEEDED +(\S+)", run("objdump", "-p", path).stdout)
+
+
+def package_of(soname):
+    found = re.search(rf"^\s*{re.escape(soname)} \(.*x86-64.*\) => (\S+)$", run("/sbin/ldconfig", "-p").stdout, re.M)
+    assert found, soname
+    for path in (os.path.realpath(found[1]), os.path.realpath(found[1]).removeprefix("/usr")):
+        owner = run("dpkg", "-S", path).stdout
+        if owner:
+            return owner.split(":")[0]
+    raise AssertionError(f"no package has {soname}")
+
+
+def test_image_has_the_libraries(prefix):
+    """Of every library that is linked the Dockerfile installs the package; the base has those of the compiler."""
+    if os.uname().machine != "x86_64":
+        pytest.skip("names of libraries are looked up for x86-64")
+    stage = (ROOT / "Dockerfile").read_text().split("\nFROM ")[-1]
+    installed = set(re.search(r"--no-install-recommends(.*?)&&", stage, re.S)[1].replace("\\", " ").split())
+    binaries = [prefix / "bin/stratusd", prefix / "bin/stratus", prefix / "lib/stratus/stratus-image.so"]
+    packages = {package_of(soname) for binary in binaries for soname in needed(binary)}
+    assert packages - installed <= {"libc6", "libgcc-s1", "libstdc++6"}

@@ -206,8 +206,8 @@ static void fill_threshold(struct scene_block *block, const struct scene_clouds 
 	double threshold = quantile(histogram, 1 - clouds->coverage);
 	const double near_overcast = fmin(1, fmax(0, (clouds->coverage - 0.95) / 0.05));
 	threshold -= profile.overcast_lift * (highest - lowest) * near_overcast * near_overcast;
-	/* What hardly any light notices, an optical thickness of 0.07 of the default droplets, is no cover. */
-	const double edge = density_share(&profile, fmin(0.04, fmax(0.003, 1.9 / clouds->thickness_m)));
+	/* What hardly any light notices, an optical thickness of 0.09 of the default droplets, is no cover. */
+	const double edge = density_share(&profile, fmin(0.06, fmax(0.003, 2.4 / clouds->thickness_m)));
 	threshold = (threshold - edge * highest) / (1 - edge);
 	if (clouds->coverage <= 0)
 		threshold = density_highest;

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-enum { PASS_FIRST, PASS_OCTAVE, PASS_LAST, PASS_FIRST_VECTOR, PASS_OCTAVE_VECTOR, PASS_CELLS };
+enum field_noise_pass { PASS_FIRST, PASS_OCTAVE, PASS_LAST, PASS_FIRST_VECTOR, PASS_OCTAVE_VECTOR, PASS_CELLS, PASS_TUFTS };
 
 static const struct pass_desc pass_descs[FIELD_NOISE_PASS_COUNT] = {
 	[PASS_FIRST] = {.file = "shaders/passes/field_octave.glsl", .defines = "#define OCTAVE_FIRST 1\n", .outputs = 1},
@@ -19,6 +19,7 @@ static const struct pass_desc pass_descs[FIELD_NOISE_PASS_COUNT] = {
 				.outputs = 1,
 				.samplers = {"coarser"}},
 	[PASS_CELLS] = {.file = "shaders/passes/field_cells.glsl", .outputs = 1, .samplers = {"slow", "before"}},
+	[PASS_TUFTS] = {.file = "shaders/passes/field_tufts.glsl", .outputs = 1, .samplers = {"slow", "before"}},
 };
 
 enum { LAYERS_MAX = 4, LATTICE_FIRST = 4, DETAIL_FIRST = 128 };
@@ -32,6 +33,10 @@ struct cell_layer {
 	double lane;    /* lower along the borders between cells */
 	double wall;    /* higher there */
 	double scatter; /* of the centres, 0..1 */
+	/* Tufts in rows across the wind in place of cells, where not 0: their length along the rows over that across them. */
+	double stretch;
+	double roll;   /* higher along the rows, which here and there join in rolls */
+	double spread; /* of the sizes of tufts, squares of lengths */
 };
 
 /* The types of cloud. Octaves of turbulence follow k^(-8/3) from `outer` down. */
@@ -40,9 +45,10 @@ static const struct cloud_kind {
 	struct cell_layer layers[LAYERS_MAX]; /* from large to small; a length of 0 ends them */
 	double roll_length, roll;             /* of waves in which the cells of the last layer stand; weight */
 	double open;                          /* coverage below which half of the cells are open */
-	double meso;                          /* weight of variation over several km */
+	double meso, meso_outer;              /* weight of variation over several km; length above which it is no stronger */
 	double outer, turbulence, life;       /* of turbulence: outer length, weight, life at 1 km */
 	double fine;                          /* share of it that is left far below 40 m, less than 1 where edges are soft */
+	double curl;                          /* by which turbulence moves the cells, m per density */
 	double displacement;                  /* of detail, m per density */
 	double billow;                        /* height of its lumps on thick layers, m */
 } kinds[CLOUD_TYPE_COUNT] = {
@@ -52,6 +58,7 @@ static const struct cloud_kind {
 			   .roll = 0.06,
 			   .open = -1,
 			   .meso = 0.28,
+			   .meso_outer = 2500,
 			   .outer = 2500,
 			   .turbulence = 0.32,
 			   .life = 1500,
@@ -64,36 +71,44 @@ static const struct cloud_kind {
 					    {190, 700, 0, 0, 0.16, 0.06, 0, 0.95}},
 				 .open = 0.38,
 				 .meso = 0.2,
+				 .meso_outer = 2500,
 				 .outer = 1500,
 				 .turbulence = 0.27,
 				 .life = 1000,
 				 .fine = 0.5,
 				 .displacement = 60,
 				 .billow = 9},
-	[CLOUD_ALTOCUMULUS] = {.profile = {2.0, 0.035, 0.03},
-			       .layers = {{1500, 2400, 600, 0, 0.25, 0.0, 0, 0.9},
-					  {420, 900, 200, 0, 0.7, 0.4, 0, 0.75},
-					  {170, 600, 0, 0, 0.25, 0.1, 0, 0.9}},
-			       .roll_length = 520,
-			       .roll = 0.22,
+	[CLOUD_ALTOCUMULUS] = {.profile = {1.8, 0.15, 0.03},
+			       .layers = {{.length = 160,
+					   .life = 800,
+					   .stretch = 1.4,
+					   .warp = 420,
+					   .dome = 1.45,
+					   .roll = 0.15,
+					   .scatter = 0.55,
+					   .spread = 0.25},
+					  {.length = 75, .life = 500, .stretch = 1.2, .dome = 0.4, .scatter = 0.9, .spread = 0.3}},
 			       .open = -1,
-			       .meso = 0.4,
-			       .outer = 1000,
-			       .turbulence = 0.22,
+			       .meso = 0.75,
+			       .meso_outer = 7000,
+			       .outer = 1500,
+			       .turbulence = 0.3,
 			       .life = 1000,
-			       .fine = 0.7,
-			       .displacement = 50},
-	[CLOUD_CIRROCUMULUS] = {.profile = {2.0, 0.04, 0.03},
-				.layers = {{1300, 2400, 600, 0, 0.2, 0.0, 0, 0.9}, {115, 500, 60, 0, 0.5, 0.06, 0, 0.95}},
-				.roll_length = 300,
-				.roll = 0.2,
-				.open = -1,
-				.meso = 0.36,
-				.outer = 1000,
-				.turbulence = 0.3,
-				.life = 1000,
-				.fine = 1,
-				.displacement = 80},
+			       .fine = 1,
+			       .curl = 80,
+			       .displacement = 60},
+	[CLOUD_CIRROCUMULUS] =
+		{.profile = {1.6, 0.12, 0.03},
+		 .layers = {{.length = 95, .life = 500, .stretch = 1.3, .dome = 0.9, .roll = 0.12, .scatter = 0.8, .spread = 0.3}},
+		 .open = -1,
+		 .meso = 0.5,
+		 .meso_outer = 6000,
+		 .outer = 1500,
+		 .turbulence = 0.3,
+		 .life = 1000,
+		 .fine = 1,
+		 .curl = 60,
+		 .displacement = 110},
 };
 
 /* A sum of splines about random values has 0.23 of their variance, and octaves that each have 0.63 of the variance of the one before add
@@ -208,8 +223,8 @@ void field_noise_fill_block(struct scene_block *block, const struct scene_clouds
 /* Weights of the four slow sums: mesoscale variation, openness of the cells, and a smooth warp. */
 static void fill_slow(struct pass_run *run, const struct cloud_kind *kind, double coverage, double spacing, bool first)
 {
-	run->arguments[1][3] = first ? (float)((kind->open - coverage) / 0.25 + 0.5) : 0;
-	run->arguments[2][0] = (float)(kind->meso * octave_scale * (spacing < 600 ? 0 : cbrt(fmin(1, spacing / 2500))));
+	run->arguments[1][3] = first ? (float)(kind->open < 0 ? 0.5 : (kind->open - coverage) / 0.25 + 0.5) : 0;
+	run->arguments[2][0] = (float)(kind->meso * octave_scale * (spacing < 600 ? 0 : cbrt(fmin(1, spacing / kind->meso_outer))));
 	run->arguments[2][1] = (float)(0.5 * octave_scale * (spacing < 1200 ? 0 : 1));
 	run->arguments[2][2] = run->arguments[2][3] = (float)(octave_scale * pow(fmin(1, spacing / 1250), 1.2));
 }
@@ -250,6 +265,7 @@ static bool pyramid_run(const struct pyramid *p, const struct texture *shape, st
 		if (last && shape) {
 			pass = PASS_LAST;
 			run.arguments[1][3] = (float)shape->width;
+			run.arguments[2][0] = (float)(kinds[p->clouds->type].curl / p->tile);
 		}
 		pass_run(p->noise->passes[pass], &run);
 		texture_finish(&sum);
@@ -286,17 +302,70 @@ static void fill_roll(float arguments[4], const struct cloud_kind *kind, const s
 	arguments[3] = (float)wrap(slid, 1);
 }
 
-/* The layer of the field or of its detail: cells a side, weights times `scale`. */
-static void fill_layer(struct pass_run *run, const struct scene_clouds *clouds, int i, int period, double scale)
+/* The layer of the field or of its detail over a tile in m, weights times `scale`. */
+static void fill_cells(struct pass_run *run, const struct scene_clouds *clouds, int i, double tile, double scale)
 {
 	const struct cell_layer *layer = &kinds[clouds->type].layers[i];
-	run->arguments[0][1] = (float)period;
+	run->arguments[0][0] = (float)run->targets[0]->width;
+	run->arguments[0][1] = (float)cells_a_tile(tile, layer->length);
 	run->arguments[0][2] = seed_number(clouds->seed, 40 + (uint32_t)i);
 	fill_lives(run->arguments[1], clouds->time_s, layer->life);
 	run->arguments[2][0] = (float)(layer->dome * scale);
 	run->arguments[2][1] = (float)(layer->lane * scale);
 	run->arguments[2][2] = (float)(layer->wall * scale);
 	run->arguments[2][3] = (float)layer->scatter;
+}
+
+/* Rows of tufts lie across the wind, more or less; in calm air anyhow. Direction from row to row, radians from east to north. */
+static double row_heading(const struct scene_clouds *clouds)
+{
+	const double east = clouds->wind_mps[0], north = clouds->wind_mps[1], share = seed_share(clouds->seed, 60);
+	return hypot(east, north) > 0 ? atan2(north, east) + 1.2 * (share - 0.5) : 2 * M_PI * share;
+}
+
+/* As noise_lattice_wrap has it: from row to row in its second coordinate. Tiles too small for slanting rows have straight ones. */
+static void fill_lattice(float lattice[4], const struct scene_clouds *clouds, const struct cell_layer *layer, double tile)
+{
+	const double heading = row_heading(clouds), across = tile / layer->length, along = across / layer->stretch;
+	lattice[0] = (float)round(along * sin(heading));
+	lattice[1] = (float)round(-along * cos(heading));
+	lattice[2] = (float)round(across * cos(heading));
+	lattice[3] = (float)round(across * sin(heading));
+	if (lattice[0] * lattice[3] - lattice[1] * lattice[2] >= 1)
+		return;
+	lattice[0] = (float)fmax(1, round(along));
+	lattice[3] = (float)fmax(1, round(across));
+	lattice[1] = lattice[2] = 0;
+}
+
+/* Likewise. */
+static void fill_tufts(struct pass_run *run, const struct scene_clouds *clouds, int i, double tile, double scale)
+{
+	const struct cell_layer *layer = &kinds[clouds->type].layers[i];
+	fill_lattice(run->arguments[0], clouds, layer, tile);
+	run->arguments[1][0] = (float)run->targets[0]->width;
+	run->arguments[1][1] = seed_number(clouds->seed, 40 + (uint32_t)i);
+	fill_lives(&run->arguments[1][2], clouds->time_s, layer->life);
+	run->arguments[2][0] = (float)(layer->dome * scale);
+	run->arguments[2][1] = (float)(layer->roll * scale);
+	run->arguments[2][2] = (float)layer->scatter;
+	run->arguments[2][3] = (float)layer->spread;
+}
+
+static void fill_layer(struct pass_run *run, const struct scene_clouds *clouds, int i, double tile, double scale)
+{
+	(kinds[clouds->type].layers[i].stretch > 0 ? fill_tufts : fill_cells)(run, clouds, i, tile, scale);
+}
+
+static enum field_noise_pass layer_pass(const struct scene_clouds *clouds, int i)
+{
+	return kinds[clouds->type].layers[i].stretch > 0 ? PASS_TUFTS : PASS_CELLS;
+}
+
+/* A tuft needs some points across, a cell with its sharp lanes more. */
+static bool layer_fits(const struct cell_layer *layer, double spacing)
+{
+	return layer->length >= (layer->stretch > 0 ? 4 : 6) * spacing;
 }
 
 static int layer_count(const struct scene_clouds *clouds)
@@ -307,11 +376,11 @@ static int layer_count(const struct scene_clouds *clouds)
 	return count;
 }
 
-/* How many stand in the field itself. A cell needs some points across; where the field has not so many, its detail has. */
+/* How many stand in the field itself; where its points are too far apart for the others, those of its detail are not. */
 static int coarse_layer_count(const struct scene_clouds *clouds)
 {
 	int count = layer_count(clouds);
-	while (count > 1 && kinds[clouds->type].layers[count - 1].length < 6 * clouds->tile_m / clouds->resolution)
+	while (count > 0 && !layer_fits(&kinds[clouds->type].layers[count - 1], clouds->tile_m / clouds->resolution))
 		count--;
 	return count;
 }
@@ -322,21 +391,25 @@ static bool shape_run(const struct field_noise *noise, const struct scene_clouds
 	const struct cloud_kind *kind = &kinds[clouds->type];
 	const int count = coarse_layer_count(clouds);
 	for (int i = 0; i < count; i++) {
-		const int period = cells_a_tile(clouds->tile_m, kind->layers[i].length);
-		const double points = 7 * fmax(period, i == count - 1 && kind->roll > 0 ? clouds->tile_m / kind->roll_length : 0);
+		const struct cell_layer *layer = &kind->layers[i];
+		const double points =
+			7 * fmax(clouds->tile_m / layer->length, i == count - 1 && kind->roll > 0 ? clouds->tile_m / kind->roll_length : 0);
 		const int side = side_for(points, clouds->resolution);
 		struct texture next;
 		if (!texture_init(&next, side, side, TEXTURE_R32F, TEXTURE_REPEAT))
 			return false;
 		struct pass_run run = {.targets = (struct texture *[]){&next}, .samplers = {slow, shape->id ? shape : slow}};
-		fill_layer(&run, clouds, i, period, 1);
-		run.arguments[0][0] = (float)side;
-		run.arguments[0][3] = (float)shape->width;
-		run.arguments[1][2] = (float)(kind->layers[i].warp * period / clouds->tile_m);
-		run.arguments[1][3] = (float)kind->layers[i].where;
-		if (i == count - 1)
-			fill_roll(run.arguments[3], kind, clouds);
-		pass_run(noise->passes[PASS_CELLS], &run);
+		fill_layer(&run, clouds, i, clouds->tile_m, 1);
+		if (layer->stretch > 0) {
+			run.arguments[3][0] = (float)(layer->warp / layer->length);
+		} else {
+			run.arguments[0][3] = (float)shape->width;
+			run.arguments[1][2] = (float)(layer->warp * run.arguments[0][1] / clouds->tile_m);
+			run.arguments[1][3] = (float)layer->where;
+			if (i == count - 1)
+				fill_roll(run.arguments[3], kind, clouds);
+		}
+		pass_run(noise->passes[layer_pass(clouds, i)], &run);
 		texture_finish(shape);
 		*shape = next;
 	}
@@ -367,7 +440,7 @@ static bool coarse_run(const struct field_noise *noise, const struct scene_cloud
 		p.fine = kind->fine;
 		p.last = clouds->resolution;
 		p.format = TEXTURE_R32F;
-		ok = pyramid_run(&p, &shape, coarse);
+		ok = pyramid_run(&p, shape.id ? &shape : &slow, coarse);
 	}
 	texture_finish(&shape);
 	texture_finish(&slow);
@@ -381,16 +454,19 @@ static void detail_cells_run(const struct field_noise *noise, const struct scene
 	const struct cloud_kind *kind = &kinds[clouds->type];
 	/* In the tile of detail that resolves them; finer ones repeat them as smaller ones. */
 	double tile = detail_tile(clouds), weight = detail_weight(clouds);
-	for (int k = detail_count(clouds); k > 1 && kind->layers[i].length < 6 * tile / FIELD_DETAIL_SIDE; k--) {
+	for (int k = detail_count(clouds); k > 1 && !layer_fits(&kind->layers[i], tile / FIELD_DETAIL_SIDE); k--) {
 		tile /= 8;
 		weight /= 2;
 	}
 	/* Where several tiles of detail show the same cells, in several sizes, each does so the less. */
 	const double share = detail_count(clouds) > 1 ? 0.5 : 1;
 	struct pass_run run = {.targets = (struct texture *[]){target}, .samplers = {before, before}};
-	fill_layer(&run, clouds, i, cells_a_tile(tile, kind->layers[i].length), share / weight);
-	run.arguments[0][0] = run.arguments[0][3] = FIELD_DETAIL_SIDE;
-	pass_run(noise->passes[PASS_CELLS], &run);
+	fill_layer(&run, clouds, i, tile, share / weight);
+	if (kind->layers[i].stretch > 0)
+		run.arguments[3][1] = 0.5f; /* rolls as strong as on average: nothing here says where */
+	else
+		run.arguments[0][3] = FIELD_DETAIL_SIDE;
+	pass_run(noise->passes[layer_pass(clouds, i)], &run);
 }
 
 static bool detail_run(const struct field_noise *noise, const struct scene_clouds *clouds, struct texture *detail)

@@ -8,7 +8,7 @@
 
 #include "renderer/stages/stage.h"
 
-enum { FIELD_NOISE_PASS_COUNT = 6, FIELD_DETAIL_SIDE = 512 };
+enum { FIELD_NOISE_PASS_COUNT = 7, FIELD_DETAIL_SIDE = 512 };
 
 struct field_noise {
 	struct pass *passes[FIELD_NOISE_PASS_COUNT];

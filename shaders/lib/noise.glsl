@@ -135,4 +135,38 @@ vec2 noise_centres(vec2 p, int period, uint seed, float whole, float fraction, f
 	}
 	return vec2(first, second);
 }
+
+// The point of a lattice that stands for all those a whole number of tiles away. lattice: a matrix by rows, which takes tiles to cells, of whole numbers
+// and with a positive determinant, the number of cells a tile. Exact while both are below some hundred thousands.
+vec2 noise_lattice_wrap(vec2 point, vec4 lattice)
+{
+	float cells = lattice.x * lattice.w - lattice.y * lattice.z;
+	float u = floor((lattice.w * point.x - lattice.y * point.y + 0.5) / cells);
+	float v = floor((lattice.x * point.y - lattice.z * point.x + 0.5) / cells);
+	return point - vec2(lattice.x * u + lattice.y * v, lattice.z * u + lattice.w * v);
+}
+
+// Lumps that run together, 0..1 or so: a power of a sum of bells about the points of a lattice, each of which wanders from one life's place to the next one's
+// and grows or shrinks meanwhile. p in lattice cells, repeating as noise_lattice_wrap says; scatter: 0 on a lattice, 1 anywhere; spread: of their sizes.
+float noise_tufts(vec2 p, vec4 lattice, uint seed, float whole, float fraction, float scatter, float spread)
+{
+	vec2 cell = floor(p);
+	float sum = 0.0;
+	for (int dy = -1; dy <= 1; dy++) {
+		for (int dx = -1; dx <= 1; dx++) {
+			vec2 corner = cell + vec2(float(dx), float(dy));
+			vec2 point = noise_lattice_wrap(corner, lattice);
+			noise_life life = noise_life_of(noise_hash2(int(point.x), int(point.y), seed), whole, fraction);
+			uint now = noise_hash(life.hash);
+			uint next = noise_hash(life.hash + 0x9e3779b1u);
+			float share = life.age * life.age * (3.0 - 2.0 * life.age);
+			vec3 here = vec3(float(now & 0x7ffu), float(now >> 11u & 0x7ffu), float(now >> 22u) * 2.0);
+			vec3 there = vec3(float(next & 0x7ffu), float(next >> 11u & 0x7ffu), float(next >> 22u) * 2.0);
+			vec3 random = mix(here, there, share) * (1.0 / 2048.0);
+			vec2 away = corner + 0.5 + scatter * (vec2(random.x, random.y) - 0.5) - p;
+			sum += exp(-10.0 * (dot(away, away) + spread * random.z));
+		}
+	}
+	return sqrt(sqrt(sum));
+}
 #endif

@@ -1,5 +1,5 @@
 // One octave of a sum of noise: a value that lives at each lattice point, added to the sum of the coarser octaves, which cubic splines interpolate.
-// arguments[0]: points a side; weight; lives so far: whole, fraction. [1]: shift of the coarser octaves, tiles; seed; side of the shape, or mean of the second sum. [2]: weights of vectors.
+// arguments[0]: points a side; weight; lives so far: whole, fraction. [1]: shift of the coarser octaves, tiles; seed; side of the shape, or mean of the second sum. [2]: weights of vectors; or tiles by which a density of 1 shifts the shape.
 // OCTAVE_FIRST: no coarser ones. OCTAVE_VECTOR: four sums at once. OCTAVE_LAST: on top of the shape.
 #include "shaders/lib/bicubic.glsl"
 #include "shaders/lib/noise.glsl"
@@ -27,7 +27,7 @@ void pass(ivec2 pixel)
 	value += bicubic_sample(coarser, uv - vec2(arguments[1]), 0.5 * arguments[0].x);
 #endif
 #if OCTAVE_LAST
-	value += bicubic_sample(shape, uv, arguments[1].w);
+	value += bicubic_sample(shape, uv + arguments[2].x * value.x * vec2(1.0, 0.6), arguments[1].w);
 #endif
 	STORE(0, value);
 }

@@ -103,31 +103,22 @@ static double spectral_slope(const float *map, int size, double tile)
 	return (n * sxy - sx * sy) / (n * sxx - sx * sx);
 }
 
+/* Altocumulus and cirrocumulus from a half of the sky on: less of it is single tufts, whose own size then is what the spectrum shows. */
 static void spectrum_is_that_of_cloud(void **state)
 {
 	(void)state;
-	for (int i = 0; i < 3; i++) {
-		const struct scene scene = looking_up(CLOUD_STRATOCUMULUS, 0.5 + 0.2 * i, 1 + (uint32_t)i);
-		float *map = map_of(scene, 4, 128);
-		const double slope = spectral_slope(map, 512, scene.clouds.tile_m);
-		print_message("stratocumulus, coverage %.1f: k^%.2f\n", scene.clouds.coverage, slope);
-		assert_float_equal(slope, -8. / 3, 0.4);
-		free(map);
-	}
-}
-
-/* Of the other types the spectrum is only said: cells as regular as those of altocumulus stand out of it. */
-static void other_spectra_fall(void **state)
-{
-	(void)state;
-	static const enum cloud_type types[] = {CLOUD_STRATUS, CLOUD_ALTOCUMULUS, CLOUD_CIRROCUMULUS};
-	for (int i = 0; i < 3; i++) {
-		const struct scene scene = looking_up(types[i], 0.7, 1);
-		float *map = map_of(scene, 4, 128);
-		const double slope = spectral_slope(map, 512, scene.clouds.tile_m);
-		print_message("%s: k^%.2f\n", scene_cloud_type_names[types[i]], slope);
-		assert_true(slope < -1.5 && slope > -3.5);
-		free(map);
+	for (int type = CLOUD_STRATUS; type <= CLOUD_CIRROCUMULUS; type++) {
+		double sum = 0;
+		for (int i = 0; i < 4; i++) {
+			const struct scene scene = looking_up((enum cloud_type)type, 0.5 + 0.1 * i, 1 + (uint32_t)i);
+			float *map = map_of(scene, 4, 128);
+			const double slope = spectral_slope(map, 512, scene.clouds.tile_m);
+			print_message("%s, coverage %.1f: k^%.2f\n", scene_cloud_type_names[type], scene.clouds.coverage, slope);
+			assert_float_equal(slope, -8. / 3, 0.4);
+			sum += slope / 4;
+			free(map);
+		}
+		print_message("%s: k^%.2f on average\n", scene_cloud_type_names[type], sum);
 	}
 }
 
@@ -217,8 +208,9 @@ static void cover_is_what_was_asked_for(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(spectrum_is_that_of_cloud),   cmocka_unit_test(other_spectra_fall),
-		cmocka_unit_test(thickness_is_the_maximum),    cmocka_unit_test(tiles_meet_without_a_seam),
+		cmocka_unit_test(spectrum_is_that_of_cloud),
+		cmocka_unit_test(thickness_is_the_maximum),
+		cmocka_unit_test(tiles_meet_without_a_seam),
 		cmocka_unit_test(cover_is_what_was_asked_for),
 	};
 	return RUN_WITH_RENDERER(tests);

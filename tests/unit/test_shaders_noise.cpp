@@ -5,6 +5,7 @@
 #include <cstdarg>
 #include <csetjmp>
 #include <cstdint>
+#include <set>
 extern "C" {
 #include <cmocka.h>
 }
@@ -20,6 +21,7 @@ namespace cloud
 using namespace glsl::cloud;
 using glsl::uint;
 using glsl::vec2;
+using glsl::vec4;
 
 #define assert_near(a, b, tolerance)                                                                                                       \
 	do {                                                                                                                               \
@@ -177,6 +179,55 @@ static void cells_live_without_jumps(void **)
 	assert_true(jump < 1.5 * 0.002 / 0.25 * 1.1);
 }
 
+/* A slanting lattice on a tile: every point has one stand-in, the same whole tiles away, and there are as many as the determinant says. */
+static void slanting_lattices_repeat(void **)
+{
+	for (const vec4 &lattice : {vec4(7, 0, 0, 5), vec4(9, -4, 3, 11), vec4(60, -25, 31, 82)}) {
+		const int cells = (int)(lattice.x * lattice.w - lattice.y * lattice.z);
+		std::set<std::pair<int, int>> points;
+		for (int y = -150; y < 150; y++)
+			for (int x = -150; x < 150; x++) {
+				const vec2 point((float)x, (float)y), stand_in = noise_lattice_wrap(point, lattice);
+				const vec2 again =
+					noise_lattice_wrap(point + vec2(2 * lattice.x - lattice.y, 2 * lattice.z - lattice.w), lattice);
+				assert_true(again.x == stand_in.x && again.y == stand_in.y);
+				points.insert({(int)stand_in.x, (int)stand_in.y});
+			}
+		assert_int_equal(points.size(), cells);
+		for (int i = 0; i < 200; i++) {
+			const vec2 p(noise_unit(noise_hash((uint)i)) * 9, noise_unit(noise_hash((uint)i + 999u)) * 9);
+			assert_near(noise_tufts(p, lattice, 5u, 3.f, 0.2f, 0.7f, 0.3f),
+				    noise_tufts(p + vec2(lattice.y, lattice.w), lattice, 5u, 3.f, 0.2f, 0.7f, 0.3f), 1e-4);
+		}
+	}
+}
+
+/* Tufts are lumps between 0 and little above 1, change from place to place without steps, and steadily over the ends of lives. */
+static void tufts_live_without_jumps(void **)
+{
+	const vec4 lattice(9, -4, 3, 11);
+	double least = 9, most = 0, jump = 0, step = 0, change = 0;
+	for (int i = 0; i < 3000; i++) {
+		const vec2 p(noise_unit(noise_hash((uint)i)) * 9, noise_unit(noise_hash((uint)i + 5555u)) * 9);
+		const auto at = [lattice](vec2 place, double time) {
+			return (double)noise_tufts(place, lattice, 7u, std::floor((float)time), (float)(time - std::floor(time)), 0.8f,
+						   0.3f);
+		};
+		for (int k = 0; k < 20; k++)
+			jump = std::fmax(jump, std::fabs(at(p, 400.9 + 0.01 * k) - at(p, 400.91 + 0.01 * k)));
+		const double value = at(p, 400.9);
+		step = std::fmax(step, std::fabs(at(p + vec2(0.004f, 0.003f), 400.9) - value));
+		change += std::fabs(at(p, 402.9) - value) / 3000;
+		least = std::fmin(least, value);
+		most = std::fmax(most, value);
+	}
+	print_message("tufts from %.2f to %.2f\n", least, most);
+	assert_true(least >= 0 && least < 0.4 && most > 0.8 && most < 1.3);
+	assert_true(jump < 0.03);
+	assert_true(step < 0.02);
+	assert_true(change > 0.05);
+}
+
 /* Values at lattice points: mean 0, variance 1, whatever their age, and steady over the ends of lives. */
 static void values_live_without_jumps(void **)
 {
@@ -212,6 +263,8 @@ int main()
 		cmocka_unit_test(variance_is_near_one),
 		cmocka_unit_test(turbulence_has_a_kolmogorov_spectrum),
 		cmocka_unit_test(cells_live_without_jumps),
+		cmocka_unit_test(slanting_lattices_repeat),
+		cmocka_unit_test(tufts_live_without_jumps),
 		cmocka_unit_test(values_live_without_jumps),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -112,11 +112,16 @@ static void fill_waves(struct scene_block *block, const struct scene *scene, dou
 	for (int i = 0; i < SEA_WAVES; i++) {
 		const double begin = octaves * pow((double)i / SEA_WAVES, 1.5), band = octaves * pow((i + 1.0) / SEA_WAVES, 1.5) - begin;
 		const double k = first * exp(begin + band * spread(i, 0.7548776662));
-		const double direction = heading + angle_of_share(spread(i + 1, 0.6180339887), spectrum_spread(&spectrum, k));
+		/* Taken out of a density of half the spread, and weighted for that: slopes across the wind would be those of few waves
+		 * else. */
+		const double spread_by_wind = spectrum_spread(&spectrum, k);
+		const double angle = angle_of_share(spread(i + 1, 0.6180339887), 0.5 * spread_by_wind),
+			     both = spread_by_wind * cos(2 * angle);
+		const double weight = (1 + both) / (1 + 0.5 * both), direction = heading + angle;
 		const double kx = k * cos(direction), ky = k * sin(direction);
 		const double phase = kx * scene->camera.position_m[0] + ky * scene->camera.position_m[1] -
 				     k * wave_speed(k) * scene->clouds.time_s + 2 * M_PI * spread(i, 0.5698402910);
-		const double turns = phase / (2 * M_PI), slope = sqrt(2 * band * spectrum_slopes(&spectrum, k));
+		const double turns = phase / (2 * M_PI), slope = sqrt(2 * weight * band * spectrum_slopes(&spectrum, k));
 		block->sea_waves[i][0] = (float)(kx / (2 * M_PI));
 		block->sea_waves[i][1] = (float)(ky / (2 * M_PI));
 		block->sea_waves[i][2] = (float)(turns - floor(turns));

@@ -429,10 +429,12 @@ void view_add_sky(vec3 disc, vec2 air, INOUT(view_parts) parts)
 #endif
 
 #if VIEW_REGION == 0
-// Of a pixel that sees `b` by this share and otherwise `a`.
+// Of a pixel that sees the ground, `b`, by this share and otherwise `a`. A small disc was spread over pixels above the horizon already.
 view_parts view_mixed(view_parts a, view_parts b, float share)
 {
-	a.sun_direct = mix(a.sun_direct, b.sun_direct, share);
+#if VIEW_LARGE_SUN
+	a.sun_direct *= 1.0 - share;
+#endif
 	a.order0 = mix(a.order0, b.order0, share);
 	a.order1 = mix(a.order1, b.order1, share);
 	a.order2 = mix(a.order2, b.order2, share);
@@ -463,7 +465,11 @@ view_parts view_ray(vec3 direction, vec3 disc)
 #if VIEW_REGION == 0
 	// A pixel that the horizon crosses shows both, each by the middle of its part.
 	float horizon = sphere_horizon(camera_position.z);
-	float high = camera_position.w * clamp(0.5 + (horizon - direction.z) / camera_position.w, 0.0, 1.0);
+	float share = clamp(0.5 + (horizon - direction.z) / camera_position.w, 0.0, 1.0);
+#if VIEW_PROJECTION == 1
+	share = step(0.5, share); // it ends at its rim
+#endif
+	float high = camera_position.w * share;
 	vec3 down = vec3(direction.x, direction.y, min(direction.z - 0.5 * (camera_position.w - high), horizon - 1e-7));
 	vec3 up = vec3(direction.x, direction.y, max(direction.z + 0.5 * high, horizon + 1e-7));
 	view_parts above = view_nothing();
@@ -479,7 +485,7 @@ view_parts view_ray(vec3 direction, vec3 disc)
 #else
 	view_add_sky(disc, sky_table_coordinates(up), above);
 #endif
-	return view_mixed(above, parts, high / camera_position.w);
+	return view_mixed(above, parts, share);
 #else
 	vec2 air = sky_table_coordinates(direction);
 #if VIEW_ABOVE && VIEW_REGION == 1

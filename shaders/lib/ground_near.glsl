@@ -62,6 +62,7 @@ vec2 ground_detail(ground_point p)
 // one of eight directions, on lattices of the world), and the first one that the ray meets on its last way to the ground is seen.
 const int GROUND_ROWS = 4;
 const float GROUND_TUFT = 0.3; // m, the smallest; farther away several are one
+const float GROUND_BLADES = 13.0; // in a tuft; likewise, lest they be smaller than pixels
 
 // One row's tufts at a place along it, in tufts. x: height 0..1, y: tone -1..1.
 vec2 ground_tuft(float base, float inside, int row, uint seed)
@@ -85,27 +86,32 @@ vec2 ground_detail(ground_point p)
 	vec2 aside = vec2(forth.y, -forth.x);
 	vec2 offset = vec2(dot(p.offset, aside), dot(p.offset, forth)); // along a row, across rows
 	vec2 foot = vec2(dot(place, aside), dot(place, forth));
-	float level = max(floor(log2(max(p.across * 6.0 / GROUND_TUFT, 1e-3)) + 0.35 * patches.z), 0.0);
+	float coarseness = log2(max(p.across / GROUND_TUFT, 1e-3)) + 0.35 * patches.z;
+	float level = max(floor(coarseness + 2.58), 0.0);
+	float finer = GROUND_BLADES * exp2(level - max(floor(coarseness + 4.6), 0.0)); // blades in a tuft
 	float size = GROUND_TUFT * exp2(level);
 	float high = min(0.6 * size, 0.4 * camera_position.z);
 	float depth = abs(offset.y) * high / camera_position.z; // across rows, from where the ray is as high as the tufts to where it meets the ground
 	float spacing = GROUND_TUFT * exp2(ceil(log2(max(depth * (1.2 / float(GROUND_ROWS)), 1e-3) / GROUND_TUFT)));
 	float rows = floor(foot.y / spacing);
-	float last = foot.y / spacing - rows + offset.y / spacing + 0.5 * patches.x;
+	float row_start = foot.y / spacing - rows;
+	float last = row_start + offset.y / spacing + 0.5 * patches.x;
 	float first = last - depth / spacing;
 	float columns = floor(foot.x / size);
 	float start = foot.x / size - columns;
-	float blades = floor(foot.x * (13.0 / size));
-	float blade_start = foot.x * (13.0 / size) - blades;
+	float blades = floor(foot.x * (finer / size));
+	float blade_start = foot.x * (finer / size) - blades;
+	float aside_of_forth = offset.x / (size * max(offset.y, 1e-3));
 	float tone = 0.0;
 	bool met = false;
 	for (int i = 0; i <= GROUND_ROWS; i++) {
 		float row = i == GROUND_ROWS ? last : min(ceil(first) + float(i), last);
 		float share = 1.0 - (last - row) * spacing / max(abs(offset.y), 1e-3); // of the way to the ground
 		int number = int(floor(row + 0.5)) + int(rows);
-		float at = offset.x * share / size;
+		// Along a row by where it would stand unbent, so that stems stand upright.
+		float at = row < last ? aside_of_forth * (row - row_start) * spacing : offset.x / size;
 		vec2 tuft = ground_tuft(columns, start + at, number, 62u);
-		vec2 blade = ground_tuft(blades, blade_start + at * 13.0, number, 63u);
+		vec2 blade = ground_tuft(blades, blade_start + at * finer, number, 63u);
 		float above = camera_position.z * (1.0 - share);
 		bool meets = !met && (i == GROUND_ROWS || above < high * (0.05 + 0.75 * tuft.x + 0.3 * blade.x));
 		tone = meets ? 0.55 * tuft.y + blade.y + 0.5 * (above / high - 0.37) : tone;

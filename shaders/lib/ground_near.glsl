@@ -136,13 +136,15 @@ vec2 ground_ragged(ground_point p)
 	vec2 foot = vec2(camera_position.x, camera_position.y);
 	vec3 wide = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.9 * texel)), 64u);
 	vec3 narrow = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.23 * texel)), 65u);
-	return texel * (0.22 * vec2(wide.x, wide.z) + 0.10 * vec2(narrow.z, narrow.y));
+	// What is shorter than the pixel's strip would come out as dots.
+	float strip = p.across / (p.mu_v * texel);
+	return texel * (0.22 / (1.0 + 2.0 * strip * strip) * vec2(wide.x, wide.z) + 0.10 / (1.0 + 40.0 * strip * strip) * vec2(narrow.z, narrow.y));
 }
 
 vec3 ground_ice(vec3 reflectance, float footprint)
 {
 	float texel = ground_mean_albedo.w / ground_patch.x;
-	float steepness = 1.0 + 5.0 / (1.0 + footprint * footprint * (16.0 / texel / texel));
+	float steepness = 1.0 + 5.0 / (1.0 + footprint * footprint * (50.0 / texel / texel));
 	float middle = max(GROUND_ICE_MIDDLE * ground_albedo.y, 1e-3);
 	float ice = reflectance.y / middle - 1.0;
 	float sharp = clamp(0.5 + 0.5 * ice * steepness, 0.5 + 0.5 * min(ice, -0.85), 0.5 + 0.5 * max(ice, 0.75));

@@ -149,8 +149,9 @@ vec3 ground_sea_ice(vec2 p, float tile)
 	ground_patch_at floe = ground_patches(p * float(floes) + warp, floes, 53u);
 	ground_patch_at plate = ground_patches(p * float(plates) + warp * 2.5, plates, 55u);
 	float basin = noise_turbulence(p, max(1, int(tile / 9000.0 + 0.5)), 4, 54u, 0.0);
-	// Leads are wide where the basin opens and close to cracks elsewhere.
-	float width = 0.015 + 0.30 * smoothstep(0.2, 1.6, basin);
+	// Leads are wide where the basin opens, close to cracks elsewhere, and some are frozen over.
+	float open = smoothstep(-0.4, 0.8, noise_turbulence(p, floes, 2, 56u, 0.0));
+	float width = 0.024 * open - 0.012 * (1.0 - open) + 0.30 * smoothstep(0.2, 1.6, basin);
 	float ice = smoothstep(width, width + 0.012, floe.border);
 	// Plates frozen together: cracks between some, ridges of blocks between others, that are snow on the lee.
 	float seam = 1.0 - smoothstep(0.02, 0.07, plate.border);

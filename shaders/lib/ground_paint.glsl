@@ -128,8 +128,8 @@ vec3 ground_country(vec2 p, float tile)
 	vec2 lot = floor(place / 32.0);
 	uint house = noise_hash2(int(lot.x), int(lot.y), district.hash + 9u);
 	float reach = length(place) * (0.75 + 0.5 * noise_unit(house)) / (90.0 + 190.0 * noise_unit(noise_hash(district.hash + 4u)));
-	bool village = (district.hash & 3u) == 0u && reach < 1.0;
-	vec3 built = (house & 7u) < 3u ? ALBEDO_ROOF : (house & 7u) < 5u ? ALBEDO_FOREST : ALBEDO_MEADOW;
+	bool village = (district.hash & 7u) == 0u && reach < 1.0;
+	vec3 built = mix(ALBEDO_MEADOW, (house & 1u) == 0u ? ALBEDO_ROOF : ALBEDO_FOREST, 0.6);
 	field = village ? built : field;
 	return mix(field, ALBEDO_ROAD, ground_line(7.0 * larger, road, texel));
 }

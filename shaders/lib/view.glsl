@@ -109,7 +109,7 @@ float view_ground_footprint(float across, float mu_v)
 #if VIEW_REGION == 0
 // At the horizon a pixel's strip reaches over kilometres: several places of it, evenly over the picture.
 const int VIEW_STRIP_PLACES = 4;
-const float VIEW_STRIP_ROWS = 3.0; // below the horizon
+const float VIEW_STRIP_ROWS = 1.9; // below the horizon; rows from 2 on have a program of their own (renderer/stages/view.c)
 #endif
 
 // Radiance of the ground under sun, sky and clouds, before the air between. direction: of the middle of what the pixel shows of the ground, which is so high as a difference of

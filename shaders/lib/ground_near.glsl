@@ -120,7 +120,7 @@ vec2 ground_detail(ground_point p)
 	// From above it is their pattern on the ground, without rows.
 	vec3 tops = ground_noise(ground_lattice_at(place, p.offset, vec2(size)), 66u + uint(int(level)));
 	vec3 leaves = ground_noise(ground_lattice_at(place, p.offset, vec2(1.6 * size / finer)), 96u + uint(int(level)));
-	tone = mix(tone, 0.8 * tops.z + 0.6 * leaves.z, smoothstep(0.3, 0.65, p.mu_v));
+	tone = mix(tone, 0.45 * tops.z + 0.7 * leaves.z, smoothstep(0.3, 0.65, p.mu_v));
 	// Crowns of trees and what is larger differ less than tufts do.
 	float contrast = ground_patch.y * (0.4 + 0.6 / (1.0 + size * size * 0.04));
 	return vec2(1.0, max(1.0 + contrast * (tone + 0.5 * patches.z / (1.0 + p.across)), 0.2));

@@ -4,7 +4,7 @@
 #ifndef STRATUS_RENDERER_SCENE_BLOCK_H
 #define STRATUS_RENDERER_SCENE_BLOCK_H
 
-enum { SCENE_BLOCK_BINDING = 0, SEA_WAVES = 24 };
+enum { SCENE_BLOCK_BINDING = 0, SEA_WAVES = 128 };
 
 struct scene_block {
 	float sun_direction[4];    /* unit vector to the sun; angular radius in radians */
@@ -44,7 +44,8 @@ struct scene_block {
 	float band_blue[4];             /* 450 nm */
 	float develop[4];   /* exposure: automatic (1) or fixed (0); its value, EV; tone (enum tone); largest code of the output */
 	float sea_state[4]; /* covariance of the sea's slopes: east-east, east-north, north-north; share of foam */
-	float sea_waves[SEA_WAVES][4]; /* longest first: wave vector, 1/m, east, north; phase at the camera's foot; slope */
+	float sea_waves[SEA_WAVES]
+		       [4]; /* longest first: wave number, 1/m, east, north; phase at the camera's foot, turns; slope over it, m */
 };
 
 #endif

@@ -62,6 +62,7 @@ vec2 ground_detail(ground_point p)
 // one of eight directions, on lattices of the world), and the first one that the ray meets on its last way to the ground is seen.
 const int GROUND_ROWS = 4;
 const float GROUND_TUFT = 0.3; // m, the smallest; farther away several are one
+const float GROUND_BLADES = 13.0; // in a tuft; likewise, lest they be smaller than pixels
 
 // One row's tufts at a place along it, in tufts. x: height 0..1, y: tone -1..1.
 vec2 ground_tuft(float base, float inside, int row, uint seed)
@@ -85,27 +86,32 @@ vec2 ground_detail(ground_point p)
 	vec2 aside = vec2(forth.y, -forth.x);
 	vec2 offset = vec2(dot(p.offset, aside), dot(p.offset, forth)); // along a row, across rows
 	vec2 foot = vec2(dot(place, aside), dot(place, forth));
-	float level = max(floor(log2(max(p.across * 6.0 / GROUND_TUFT, 1e-3)) + 0.35 * patches.z), 0.0);
+	float coarseness = log2(max(p.across / GROUND_TUFT, 1e-3)) + 0.35 * patches.z;
+	float level = max(floor(coarseness + 2.58), 0.0);
+	float finer = GROUND_BLADES * exp2(level - max(floor(coarseness + 4.6), 0.0)); // blades in a tuft
 	float size = GROUND_TUFT * exp2(level);
 	float high = min(0.6 * size, 0.4 * camera_position.z);
 	float depth = abs(offset.y) * high / camera_position.z; // across rows, from where the ray is as high as the tufts to where it meets the ground
 	float spacing = GROUND_TUFT * exp2(ceil(log2(max(depth * (1.2 / float(GROUND_ROWS)), 1e-3) / GROUND_TUFT)));
 	float rows = floor(foot.y / spacing);
-	float last = foot.y / spacing - rows + offset.y / spacing + 0.5 * patches.x;
+	float row_start = foot.y / spacing - rows;
+	float last = row_start + offset.y / spacing + 0.5 * patches.x;
 	float first = last - depth / spacing;
 	float columns = floor(foot.x / size);
 	float start = foot.x / size - columns;
-	float blades = floor(foot.x * (13.0 / size));
-	float blade_start = foot.x * (13.0 / size) - blades;
+	float blades = floor(foot.x * (finer / size));
+	float blade_start = foot.x * (finer / size) - blades;
+	float aside_of_forth = offset.x / (size * max(offset.y, 1e-3));
 	float tone = 0.0;
 	bool met = false;
 	for (int i = 0; i <= GROUND_ROWS; i++) {
 		float row = i == GROUND_ROWS ? last : min(ceil(first) + float(i), last);
 		float share = 1.0 - (last - row) * spacing / max(abs(offset.y), 1e-3); // of the way to the ground
 		int number = int(floor(row + 0.5)) + int(rows);
-		float at = offset.x * share / size;
+		// Along a row by where it would stand unbent, so that stems stand upright.
+		float at = row < last ? aside_of_forth * (row - row_start) * spacing : offset.x / size;
 		vec2 tuft = ground_tuft(columns, start + at, number, 62u);
-		vec2 blade = ground_tuft(blades, blade_start + at * 13.0, number, 63u);
+		vec2 blade = ground_tuft(blades, blade_start + at * finer, number, 63u);
 		float above = camera_position.z * (1.0 - share);
 		bool meets = !met && (i == GROUND_ROWS || above < high * (0.05 + 0.75 * tuft.x + 0.3 * blade.x));
 		tone = meets ? 0.55 * tuft.y + blade.y + 0.5 * (above / high - 0.37) : tone;
@@ -113,8 +119,8 @@ vec2 ground_detail(ground_point p)
 	}
 	// From above it is their pattern on the ground, without rows.
 	vec3 tops = ground_noise(ground_lattice_at(place, p.offset, vec2(size)), 66u + uint(int(level)));
-	vec3 leaves = ground_noise(ground_lattice_at(place, p.offset, vec2(0.3 * size)), 96u + uint(int(level)));
-	tone = mix(tone, 0.8 * tops.z + 0.6 * leaves.z, smoothstep(0.3, 0.65, p.mu_v));
+	vec3 leaves = ground_noise(ground_lattice_at(place, p.offset, vec2(1.6 * size / finer)), 96u + uint(int(level)));
+	tone = mix(tone, 0.45 * tops.z + 0.7 * leaves.z, smoothstep(0.3, 0.65, p.mu_v));
 	// Crowns of trees and what is larger differ less than tufts do.
 	float contrast = ground_patch.y * (0.4 + 0.6 / (1.0 + size * size * 0.04));
 	return vec2(1.0, max(1.0 + contrast * (tone + 0.5 * patches.z / (1.0 + p.across)), 0.2));
@@ -130,13 +136,15 @@ vec2 ground_ragged(ground_point p)
 	vec2 foot = vec2(camera_position.x, camera_position.y);
 	vec3 wide = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.9 * texel)), 64u);
 	vec3 narrow = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.23 * texel)), 65u);
-	return texel * (0.22 * vec2(wide.x, wide.z) + 0.10 * vec2(narrow.z, narrow.y));
+	// What is shorter than the pixel's strip would come out as dots.
+	float strip = p.across / (p.mu_v * texel);
+	return texel * (0.22 / (1.0 + 2.0 * strip * strip) * vec2(wide.x, wide.z) + 0.10 / (1.0 + 40.0 * strip * strip) * vec2(narrow.z, narrow.y));
 }
 
 vec3 ground_ice(vec3 reflectance, float footprint)
 {
 	float texel = ground_mean_albedo.w / ground_patch.x;
-	float steepness = 1.0 + 5.0 / (1.0 + footprint * footprint * (16.0 / texel / texel));
+	float steepness = 1.0 + 5.0 / (1.0 + footprint * footprint * (50.0 / texel / texel));
 	float middle = max(GROUND_ICE_MIDDLE * ground_albedo.y, 1e-3);
 	float ice = reflectance.y / middle - 1.0;
 	float sharp = clamp(0.5 + 0.5 * ice * steepness, 0.5 + 0.5 * min(ice, -0.85), 0.5 + 0.5 * max(ice, 0.75));

@@ -1,7 +1,7 @@
 // The scene as uniforms; what each member is: renderer/scene_block.h.
 #ifndef SHADERS_LIB_SCENE_BLOCK
 #define SHADERS_LIB_SCENE_BLOCK
-const int SEA_WAVES = 24;
+const int SEA_WAVES = 128;
 #ifndef __cplusplus
 layout(std140, binding = 0) uniform scene_block {
 	vec4 sun_direction;

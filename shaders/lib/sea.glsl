@@ -1,11 +1,11 @@
 // The sea: a rough surface that mirrors sky, clouds and sun, light out of the water below, and foam.
 //
-// Slopes are normally distributed after Cox and Munk 1954 (J. Opt. Soc. Am. 44, 838). Waves that pixels resolve are a sum of sines that travel as waves on deep water do; the
-// others are roughness, so that both together keep the variance at every distance (Bruneton, Neyret and Holzschuch 2010, "Real-time Realistic Ocean Lighting using
-// Seamless Transitions from Geometry to BRDF").
+// Slopes are normally distributed after Cox and Munk 1954 (J. Opt. Soc. Am. 44, 838). Waves that pixels resolve are a sum of many sines that travel as waves on deep water do
+// (renderer/stages/sea.c); the others are roughness, so that both together keep the variance at every distance (Bruneton, Neyret and Holzschuch 2010, "Real-time Realistic Ocean
+// Lighting using Seamless Transitions from Geometry to BRDF").
 #ifndef SHADERS_LIB_SEA
 #define SHADERS_LIB_SEA
-#include "shaders/lib/ground_lattice.glsl"
+#include "shaders/lib/scene_block.glsl"
 #include "shaders/lib/slopes.glsl"
 
 #ifndef __cplusplus
@@ -16,8 +16,6 @@ const float SEA_INDEX = 1.34; // of refraction; sea water in the visible (Quan a
 // Radiance out of the water over the irradiance on it, 1/sr, at 650, 550, 450 nm: clear open ocean with 0.3 mg/m3 of chlorophyll. Reflectance 0.33 bb/a below the surface (Morel and
 // Prieur 1977) with absorption by water (Pope and Fry 1997), by plankton and its yellow matter (Morel 1991), scattering by water and particles (Morel 1988); 0.13 of it leaves upwards.
 const vec3 SEA_LEAVING = vec3(0.00020, 0.00144, 0.0040);
-const float SEA_BEND_WIDE = 170.0; // m
-const float SEA_BEND_NARROW = 3.5;
 const float SEA_FOAM = 0.22; // reflectance of whitecaps of all ages (Koepke 1984, Appl. Opt. 23, 1816)
 
 // Texels of the mirrored sky a side, and how much of the picture's half-width the horizon's circle takes.
@@ -49,38 +47,44 @@ vec3 sea_sky_direction(vec2 at)
 	return vec3(p * (sqrt(1.0 - z * z) * inversesqrt(max(dot(p, p), 1e-12))), z);
 }
 
-// Slopes as they are seen: those resolved, and the covariance of those that are not. A slope is that of the normal (x, y, 1).
+// Slopes as they are seen: those resolved, and the covariance (xx, xy, yy) of those that are not, and of all. A slope is that of the normal (x, y, 1).
 struct sea_slopes {
 	vec2 resolved;
-	vec3 covariance; // xx, xy, yy
+	vec3 covariance;
+	vec3 total;
 };
+
+// Waves shorter than this many pixels are roughness alone; those of twice the length are there by two thirds.
+const float SEA_WAVE_PIXELS = 2.3;
 
 // offset: from the camera's foot, m; heading: horizontal unit vector to the viewer; across, along: size of the pixel on the water, m.
 sea_slopes sea_slopes_at(vec2 offset, vec2 heading, float across, float along)
 {
 	sea_slopes s;
 	s.resolved = vec2(0.0);
-	s.covariance = vec3(sea_state);
-	// Crests of a few sines would cross like threads of cloth: gusts and currents bend them.
-	vec2 foot = vec2(camera_position.x, camera_position.y);
-	vec3 wide = ground_noise(ground_lattice_at(foot, offset, vec2(SEA_BEND_WIDE)), 81u);
-	vec3 narrow = ground_noise(ground_lattice_at(foot, offset, vec2(SEA_BEND_NARROW)), 82u);
-	offset += vec2(wide.x, wide.z) * (0.06 * SEA_BEND_WIDE) + vec2(narrow.z, narrow.y) * (0.05 * SEA_BEND_NARROW);
-	for (int i = 0; i < SEA_WAVES; i++) {
-		vec4 wave = sea_waves[i]; // wave vector, 1/m; phase; slope
-		vec2 k = vec2(wave.x, wave.y);
-		float along_k = dot(k, heading) * along;
-		float k2 = dot(k, k);
-		if (k2 * across * across > 50.0)
+	vec3 seen = vec3(0.0);
+	// The pixel as a quadratic form of wave numbers: 1 where a wave is no longer seen.
+	float far = SEA_WAVE_PIXELS * SEA_WAVE_PIXELS * along * along;
+	float wide = SEA_WAVE_PIXELS * SEA_WAVE_PIXELS * across * across;
+	vec3 pixel = vec3(wide) + (far - wide) * vec3(heading.x * heading.x, 2.0 * heading.x * heading.y, heading.y * heading.y);
+	pixel.y -= wide;
+	for (int first = 0; first < SEA_WAVES; first += 4) {
+		vec2 longest = vec2(sea_waves[first].x, sea_waves[first].y);
+		if (dot(longest, longest) * wide > 1.1)
 			break; // so are all that follow
-		float across_k2 = max(k2 * along * along - along_k * along_k, 0.0) * (across / along) * (across / along);
-		// Pixels weigh as a normal distribution of half their size.
-		float left = exp(-0.125 * (along_k * along_k + across_k2));
-		float slope = wave.w * left;
-		vec2 unit = k * inversesqrt(k2);
-		s.resolved -= unit * (slope * cos(dot(k, offset) + wave.z));
-		s.covariance -= vec3(unit.x * unit.x, unit.x * unit.y, unit.y * unit.y) * (0.5 * slope * slope);
+		for (int i = 0; i < 4; i++) {
+			vec4 wave = sea_waves[first + i]; // wave number, 1/m; phase, turns; slope over wave number
+			float left = max(1.0 - wave.x * (wave.x * pixel.x + wave.y * pixel.y) - wave.y * wave.y * pixel.z, 0.0);
+			vec2 slope = vec2(wave.x, wave.y) * (wave.w * left * left);
+			// A cosine for eyes: a cubic of the same variance.
+			float turn = wave.x * offset.x + wave.y * offset.y + wave.z;
+			float x = abs(turn - floor(turn) - 0.5) - 0.25;
+			s.resolved += slope * (x * (6.0877 - 32.468 * x * x));
+			seen += vec3(slope.x * slope.x, slope.x * slope.y, slope.y * slope.y);
+		}
 	}
+	s.total = vec3(sea_state);
+	s.covariance = s.total - 0.5 * seen;
 	return s;
 }
 
@@ -90,10 +94,19 @@ float sea_variance(vec3 covariance, vec2 along)
 	return max(covariance.x * along.x * along.x + 2.0 * covariance.y * along.x * along.y + covariance.z * along.y * along.y, 1e-5);
 }
 
+// What the sea shows of itself to the direction of a unit vector, over its horizontal area, before one part hides another.
+float sea_shown_area(vec3 covariance, vec3 to)
+{
+	vec2 flat_to = vec2(to.x, to.y);
+	float sine = sqrt(max(dot(flat_to, flat_to), 1e-8));
+	float deviation = sine * sqrt(sea_variance(covariance, flat_to / sine));
+	return deviation * normal_ramp(max(to.z, 1e-3) / deviation);
+}
+
 // Radiance by a beam of irradiance 1 normal to it: Cox and Munk's probability of the slopes that mirror it to the viewer, over the area that the sea shows, with
-// Smith's shadowing towards both (Ross, Dion and Potvin 2005, J. Opt. Soc. Am. A 22, 2442). to_viewer and to_sun are unit vectors, z up; area: of what the
-// viewer sees, over the horizontal one.
-float sea_glint(sea_slopes s, vec3 to_viewer, vec3 to_sun, float area)
+// Smith's shadowing towards both (Ross, Dion and Potvin 2005, J. Opt. Soc. Am. A 22, 2442). to_viewer and to_sun are unit vectors, z up. The area is that of all slopes: pixels
+// lie on the flat sea, and the mean over them is Cox and Munk's then.
+float sea_glint(sea_slopes s, vec3 to_viewer, vec3 to_sun)
 {
 	vec3 middle = normalize(to_viewer + to_sun + vec3(0.0, 0.0, 1e-4));
 	float up = max(middle.z, 1e-3);
@@ -102,11 +115,8 @@ float sea_glint(sea_slopes s, vec3 to_viewer, vec3 to_sun, float area)
 	float determinant = max(c.x * c.z - c.y * c.y, 1e-8);
 	float exponent = (c.z * away.x * away.x - 2.0 * c.y * away.x * away.y + c.x * away.y * away.y) / determinant;
 	float probability = exp(-0.5 * min(exponent, 80.0)) / (2.0 * PI * sqrt(determinant));
-	vec2 flat_sun = vec2(to_sun.x, to_sun.y);
-	float sine = sqrt(max(dot(flat_sun, flat_sun), 1e-8));
-	float rise = max(to_sun.z, 1e-3) / (sine * sqrt(sea_variance(c, flat_sun / sine)));
-	float hidden = to_viewer.z * (normal_ramp(rise) / rise - 1.0);
-	return sea_fresnel(dot(middle, to_viewer)) * probability / (4.0 * up * up * up * up * max(area + hidden, 1e-4));
+	float hidden = to_viewer.z * (sea_shown_area(s.total, to_sun) / max(to_sun.z, 1e-3) - 1.0);
+	return sea_fresnel(dot(middle, to_viewer)) * probability / (4.0 * up * up * up * up * max(sea_shown_area(s.total, to_viewer) + hidden, 1e-4));
 }
 
 // The sky as the slopes that the viewer sees mirror it. Facets turned to the viewer show more of themselves, and at a slant hide the others: mean and deviation of
@@ -142,9 +152,8 @@ vec3 sea_radiance(sea_slopes s, vec3 to_viewer, vec3 to_sun, vec3 beam, vec3 rec
 	vec2 heading = dot(flat_view, flat_view) > 1e-6 ? flat_view / sine : vec2(0.0, 1.0);
 	float deviation = sqrt(sea_variance(s.covariance, heading));
 	float rise = min((to_viewer.z / sine + dot(s.resolved, heading)) / deviation, 1e6);
-	float area = sine * deviation * normal_ramp(rise);
 	vec3 irradiance = received + beam * max(to_sun.z, 0.0);
 	vec3 below = irradiance * (SEA_LEAVING + vec3(SEA_FOAM * sea_state.w / PI));
-	return sea_mirrored_sky(s, to_viewer, heading, deviation, rise) + beam * (to_sun.z > 0.0 ? sea_glint(s, to_viewer, to_sun, area) : 0.0) + below;
+	return sea_mirrored_sky(s, to_viewer, heading, deviation, rise) + beam * (to_sun.z > 0.0 ? sea_glint(s, to_viewer, to_sun) : 0.0) + below;
 }
 #endif

@@ -71,14 +71,17 @@ float view_shadow_thickness(vec2 place, float footprint)
 }
 #endif
 
-// Radiance of the ground under sun, sky and clouds, before the air between.
-vec3 view_ground(vec2 place, ground_point point)
+// Light that a place of the ground receives, and its reflectance; each a mean.
+struct view_lit {
+	vec3 beam;     // normal to it
+	vec3 received; // other
+	vec3 reflectance;
+};
+
+void view_add_lit(vec2 place, vec2 ragged, float footprint, vec3 sun, float share, INOUT(view_lit) lit)
 {
-	float mu_sun = point.mu_sun;
-	// A pixel covers a long strip at a slant, which the means of squares stand for: larger ones than of the strip's area, lest rows at the horizon show single places.
-	float footprint = point.across * pow(point.mu_v, -0.75);
 	vec3 received = vec3(sky_irradiance_ground);
-	vec3 beam = sun_irradiance(0.0, mu_sun);
+	vec3 beam = sun;
 #if VIEW_CLOUDS
 	{
 		received = vec3(textureLod(ground_received, place / cloud_layer.z, 0.0));
@@ -88,22 +91,62 @@ vec3 view_ground(vec2 place, ground_point point)
 		beam *= slab_directional_transmittance(view_shadow_thickness(through, max(footprint, penumbra)));
 	}
 #endif
+	lit.beam += share * beam;
+	lit.received += share * received;
+#if VIEW_GROUND == 3
+	lit.reflectance += share * ground_ice(ground_reflectance(place + ragged, footprint), footprint);
+#elif VIEW_GROUND != 2
+	lit.reflectance += share * ground_reflectance(place, footprint);
+#endif
+}
+
+// A pixel covers a long strip at a slant, which the means of squares stand for: larger ones than of the strip's area, lest rows at the horizon show single places.
+float view_ground_footprint(float across, float mu_v)
+{
+	return across * pow(mu_v, -0.75);
+}
+
+#if VIEW_REGION == 0
+// At the horizon a pixel's strip reaches over kilometres: several places of it, evenly over the picture.
+const int VIEW_STRIP_PLACES = 4;
+const float VIEW_STRIP_ROWS = 1.9; // below the horizon; rows from 2 on have a program of their own (renderer/stages/view.c)
+#endif
+
+// Radiance of the ground under sun, sky and clouds, before the air between. direction: of the middle of what the pixel shows of the ground, which is so high as a difference of
+// sines of elevation.
+vec3 view_ground(vec3 direction, float high, ground_point point)
+{
+	vec2 place = vec2(camera_position) + point.offset;
+	float mu_sun = point.mu_sun;
+	vec3 sun = sun_irradiance(0.0, mu_sun);
+	vec2 ragged = vec2(0.0);
+#if VIEW_GROUND == 3
+	ragged = ground_ragged(point);
+#endif
+	view_lit lit = view_lit(vec3(0.0), vec3(0.0), vec3(0.0));
+#if VIEW_REGION == 0
+	int places = direction.z > sphere_horizon(camera_position.z) - VIEW_STRIP_ROWS * camera_position.w ? VIEW_STRIP_PLACES : 1;
+	for (int i = 0; i < places; i++) {
+		float z = direction.z + high * ((float(i) + 0.5) / float(places) - 0.5);
+		float t = places > 1 ? max(sphere_distance_down(camera_position.z, z, 0.0), 0.0) : 0.0;
+		float mu_v = places > 1 ? max(-sphere_cosine(camera_position.z, z, t, 0.0), 0.002) : point.mu_v;
+		vec2 there = places > 1 ? vec2(camera_position) + vec2(direction) * t : place;
+		float across = places > 1 ? camera_position.w * t : point.across;
+		view_add_lit(there, ragged, view_ground_footprint(across, mu_v), sun, 1.0 / float(places), lit);
+	}
+#else
+	view_add_lit(place, ragged, view_ground_footprint(point.across, point.mu_v), sun, 1.0, lit);
+#endif
 #if VIEW_GROUND == 2
 	vec2 heading = -point.offset * inversesqrt(max(dot(point.offset, point.offset), 1e-8));
 	vec2 flat_sun = vec2(sun_direction.x, sun_direction.y) * inversesqrt(max(1.0 - sun_direction.z * sun_direction.z, 1e-8));
 	vec3 to_viewer = vec3(heading * sqrt(1.0 - point.mu_v * point.mu_v), point.mu_v);
 	vec3 to_sun = vec3(flat_sun * sqrt(1.0 - mu_sun * mu_sun), mu_sun);
 	sea_slopes slopes = sea_slopes_at(point.offset, heading, point.across, point.across / point.mu_v);
-	return ground_patch.y * sea_radiance(slopes, to_viewer, to_sun, beam, received);
+	return ground_patch.y * sea_radiance(slopes, to_viewer, to_sun, lit.beam, lit.received);
 #else
 	vec2 detail = ground_detail(point);
-	vec3 direct = beam * max(mu_sun, 0.0);
-#if VIEW_GROUND == 3
-	vec3 reflectance = ground_ice(ground_reflectance(place + ground_ragged(point), footprint), footprint);
-#else
-	vec3 reflectance = ground_reflectance(place, footprint);
-#endif
-	return reflectance * (received + direct * detail.x) * (detail.y / PI);
+	return lit.reflectance * (lit.received + lit.beam * (max(mu_sun, 0.0) * detail.x)) * (detail.y / PI);
 #endif
 }
 
@@ -348,20 +391,18 @@ void view_cloud_top(vec3 direction, vec4 place, vec4 light, vec2 air, INOUT(view
 }
 #endif
 
-// What lies below the horizon, seen through the layer as `parts` has it.
-void view_add_ground(vec3 direction, vec2 air, INOUT(view_parts) parts)
+// What lies below the horizon, seen through the layer as `parts` has it. high: of the pixel's part there, as for view_ground.
+void view_add_ground(vec3 direction, float high, vec2 air, INOUT(view_parts) parts)
 {
 	float t = max(sphere_distance_down(camera_position.z, min(direction.z, sphere_horizon(camera_position.z) - 1e-7), 0.0), 0.0);
-	vec2 place = vec2(camera_position) + vec2(direction) * t;
-	float mu_v = max(-sphere_cosine(camera_position.z, direction.z, t, 0.0), 0.002);
 	ground_point point;
 	point.offset = vec2(direction) * t;
 	point.across = camera_position.w * t;
-	point.mu_v = mu_v;
+	point.mu_v = max(-sphere_cosine(camera_position.z, direction.z, t, 0.0), 0.002);
 	point.mu_sun = view_sun_cosine(direction, t, 0.0);
 	vec3 to_end = vec3(textureLod(air_to_end, air, 0.0));
 	if (parts.transmittance.y > 1e-5)
-		parts.ground = view_ground(place, point) * to_end * parts.transmittance;
+		parts.ground = view_ground(direction, high, point) * to_end * parts.transmittance;
 	vec3 total = vec3(textureLod(sky_total, air, 0.0));
 #if VIEW_ABOVE
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
@@ -387,6 +428,29 @@ void view_add_sky(vec3 disc, vec2 air, INOUT(view_parts) parts)
 }
 #endif
 
+#if VIEW_REGION == 0
+// Of a pixel that sees the ground, `b`, by this share and otherwise `a`. A small disc was spread over pixels above the horizon already.
+view_parts view_mixed(view_parts a, view_parts b, float share)
+{
+#if VIEW_LARGE_SUN
+	a.sun_direct *= 1.0 - share;
+#endif
+	a.order0 = mix(a.order0, b.order0, share);
+	a.order1 = mix(a.order1, b.order1, share);
+	a.order2 = mix(a.order2, b.order2, share);
+	a.multiple = mix(a.multiple, b.multiple, share);
+	a.cloud_sky = mix(a.cloud_sky, b.cloud_sky, share);
+	a.cloud_ground = mix(a.cloud_ground, b.cloud_ground, share);
+	a.sky = mix(a.sky, b.sky, share);
+	a.ground = mix(a.ground, b.ground, share);
+	a.air = mix(a.air, b.air, share);
+	a.transmittance = mix(a.transmittance, b.transmittance, share);
+	a.optical_thickness = mix(a.optical_thickness, b.optical_thickness, share);
+	a.distance = share > 0.5 ? b.distance : a.distance;
+	return a;
+}
+#endif
+
 // The whole picture. Decided when the shader is built, since software renderers execute both sides of every branch:
 // VIEW_CLOUDS: there is a layer; VIEW_ABOVE: the camera is above it; VIEW_SOLVED: shading; VIEW_TWILIGHT: the sun lights the base somewhere; VIEW_COLOR_ONLY: parts are not asked for; VIEW_REGION: rays of this part of the picture end on the ground (1), meet neither ground nor, from above, the layer (2), or do either (0).
 // disc: radiance of the sun's disc in the pixel (shaders/lib/sun_disc.glsl).
@@ -397,30 +461,47 @@ view_parts view_ray_seen(vec3 direction, vec3 disc, vec4 place, vec4 light)
 view_parts view_ray(vec3 direction, vec3 disc)
 #endif
 {
-	vec2 air = sky_table_coordinates(direction);
 	view_parts parts = view_nothing();
-#if VIEW_REGION == 1
-	bool to_ground = true;
-#elif VIEW_REGION == 2
-	bool to_ground = false;
-#else
-	bool to_ground = direction.z <= sphere_horizon(camera_position.z);
+#if VIEW_REGION == 0
+	// A pixel that the horizon crosses shows both, each by the middle of its part.
+	float horizon = sphere_horizon(camera_position.z);
+	float share = clamp(0.5 + (horizon - direction.z) / camera_position.w, 0.0, 1.0);
+#if VIEW_PROJECTION == 1
+	share = step(0.5, share); // it ends at its rim
 #endif
-#if VIEW_ABOVE && VIEW_REGION != 2
-	// Rays that end on the ground, or pass between the horizons of layer and ground, meet the layer first.
+	float high = camera_position.w * share;
+	vec3 down = vec3(direction.x, direction.y, min(direction.z - 0.5 * (camera_position.w - high), horizon - 1e-7));
+	vec3 up = vec3(direction.x, direction.y, max(direction.z + 0.5 * high, horizon + 1e-7));
+	view_parts above = view_nothing();
+#if VIEW_ABOVE
+	if (place.x > 0.0) {
+		view_cloud_top(direction, place, light, sky_table_coordinates(direction), parts);
+		above = parts;
+	}
+#endif
+	view_add_ground(down, high, sky_table_coordinates(down), parts);
+#if VIEW_CLOUDS && !VIEW_ABOVE
+	above = view_from_below(up, sky_table_coordinates(up), disc);
+#else
+	view_add_sky(disc, sky_table_coordinates(up), above);
+#endif
+	return view_mixed(above, parts, share);
+#else
+	vec2 air = sky_table_coordinates(direction);
+#if VIEW_ABOVE && VIEW_REGION == 1
+	// Rays that end on the ground meet the layer first.
 	if (place.x > 0.0)
 		view_cloud_top(direction, place, light, air, parts);
 #endif
-	if (to_ground) {
-		view_add_ground(direction, air, parts);
-	} else {
-#if VIEW_CLOUDS && !VIEW_ABOVE
-		parts = view_from_below(direction, air, disc);
+#if VIEW_REGION == 1
+	view_add_ground(direction, camera_position.w, air, parts);
+#elif VIEW_CLOUDS && !VIEW_ABOVE
+	parts = view_from_below(direction, air, disc);
 #else
-		view_add_sky(disc, air, parts);
+	view_add_sky(disc, air, parts);
 #endif
-	}
 	return parts;
+#endif
 }
 
 #if VIEW_ABOVE

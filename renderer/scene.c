@@ -29,6 +29,7 @@ const char *const scene_layer_names[] = {"color",
 					 "transmittance",
 					 "optical_thickness",
 					 "distance",
+					 "standard_error",
 					 NULL};
 
 const char *const scene_path_names[] = {"sun_direct",   "order0", "order1", "order2", "multiple", "cloud_sky",
@@ -65,6 +66,8 @@ struct scene scene_default(void)
 	scene.model.shading = SHADING_SOLVED;
 	scene.model.optics = OPTICS_MIE;
 	scene.model.paths = SCENE_PATHS_ALL;
+	scene.model.samples = 64;
+	scene.model.seed = 1;
 	scene.output.width = scene_camera_shape(&scene.camera).width;
 	scene.output.height = scene_camera_shape(&scene.camera).height;
 	scene.output.format = IMAGE_PNG;

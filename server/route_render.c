@@ -7,8 +7,8 @@
 #include "server/routes.h"
 
 #include "renderer/log.h"
+#include "server/call.h"
 #include "server/clock.h"
-#include "server/entity_tag.h"
 #include "server/json_document.h"
 #include "server/negotiation.h"
 #include "server/query.h"
@@ -109,19 +109,15 @@ static void read_scene(struct request *request, struct render_work *work)
 /* What follows from the scene alone. false when out of memory. */
 static bool describe(struct render_work *work, const struct service *service)
 {
-	struct text tagged = {0}, location = {0};
+	struct text location = {0};
 	char *query = scene_canonical_query(&work->input.scene);
 	work->canonical = scene_canonical(&work->input.scene);
 	scene_canonical_key(&work->input.scene, work->key);
 	text_add(&location, "/v1/render");
 	text_printf(&location, "%s%s", query && *query ? "?" : "", query ? query : "");
 	work->location = text_take(&location);
-	text_printf(&tagged, "%s|%s", work->canonical ? work->canonical : "", service->pixel_version);
-	bool good = query && work->canonical && work->location && !tagged.failed;
-	if (good)
-		entity_tag_of(tagged.data, tagged.length, work->tag);
+	bool good = query && work->canonical && work->location && call_tag(service, "render", strdup(work->canonical), work->tag);
 	free(query);
-	text_finish(&tagged);
 	return good;
 }
 
@@ -145,29 +141,11 @@ static enum MHD_Result send_image(struct request *request, unsigned status, stru
 static enum MHD_Result finish(struct request *request)
 {
 	struct render_work *work = request->work;
-	struct metrics *metrics = request->service->metrics;
-	if (work->refused) {
-		if (request->service->stopping)
-			return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
-		metrics_count_rejection(metrics, REJECTED_FULL);
-		return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "%d renders are waiting, and no more may.",
-						 request->service->config->queue_length);
-	}
+	if (work->refused)
+		return call_refuse_render(request);
 	timings_set(&request->timings, TIMING_QUEUE, work->job.waited_ms);
-	switch (work->job.outcome) {
-	case RENDER_OUTCOME_EXPIRED:
-		return response_send_new_problem(request, PROBLEM_DEADLINE, "The image was not ready within its deadline.");
-	case RENDER_OUTCOME_ABANDONED:
-		return MHD_NO;
-	case RENDER_OUTCOME_NO_MEMORY:
-		return response_send_new_problem(request, PROBLEM_NO_MEMORY,
-						 "The device has no memory for an image of this size and these layers now.");
-	case RENDER_OUTCOME_FAILED:
-		return response_send_new_problem(request, PROBLEM_RENDER_FAILED,
-						 "The image could not be made. The log has the reason under %s.", request->id);
-	case RENDER_OUTCOME_OK:
-		break;
-	}
+	if (work->job.outcome != RENDER_OUTCOME_OK)
+		return call_send_render_failure(request, work->job.outcome, "The image", "an image of this size and these layers");
 	timings_set_frame(&request->timings, &work->job.frame);
 	timings_add_optics(&request->timings, work->job.prepared_ms, work->job.prepared);
 	timings_add(&request->timings, TIMING_FIELD, work->decode_ms[0]);
@@ -176,7 +154,7 @@ static enum MHD_Result finish(struct request *request)
 	struct MHD_Response *response = response_create((char *)work->image.data, work->image.size);
 	work->image.data = NULL;
 	enum MHD_Result result = send_image(request, MHD_HTTP_OK, response);
-	metrics_count_timings(metrics, &request->timings);
+	metrics_count_timings(request->service->metrics, &request->timings);
 	return result;
 }
 
@@ -185,19 +163,7 @@ static enum MHD_Result finish(struct request *request)
 static bool is_abandoned(struct render_job *job)
 {
 	const struct render_work *work = (const struct render_work *)((char *)job - offsetof(struct render_work, job));
-	return work->request->service->giving_up || request_is_abandoned(work->request);
-}
-
-/* Counted here and not in `finish`, which libmicrohttpd does not call for a connection that it finds closed. */
-static void hand_back(struct render_work *work)
-{
-	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
-						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
-						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
-						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
-	if (work->job.outcome != RENDER_OUTCOME_OK)
-		metrics_count_end(work->request->service->metrics, ends[work->job.outcome]);
-	request_resume(work->request);
+	return call_is_abandoned(work->request);
 }
 
 static void encode(struct work *base)
@@ -219,7 +185,7 @@ static void encode(struct work *base)
 	work->encode_ms = clock_now_ms() - start;
 	free(work->job.frame.pixels);
 	work->job.frame.pixels = NULL;
-	hand_back(work);
+	call_end_render(work->request, &work->job);
 }
 
 static void on_rendered(struct render_job *job)
@@ -232,7 +198,7 @@ static void on_rendered(struct render_job *job)
 	if (job->outcome == RENDER_OUTCOME_OK)
 		worker_pool_wait(work->request->service->workers, &work->encode);
 	else
-		hand_back(work);
+		call_end_render(work->request, &work->job);
 }
 
 /* --- the way through ------------------------------------------------------------------------------------------------------------ */
@@ -257,7 +223,7 @@ static void decode(struct work *base)
 	work->job.outcome = RENDER_OUTCOME_FAILED;
 	if (render_job_is_over(&work->job) ||
 	    !scene_assets_decode(service->maps, service->images, &work->input.scene, &work->assets, is_over, &work->job, work->decode_ms))
-		hand_back(work);
+		call_end_render(work->request, &work->job);
 	else if (!preparation_push(service->preparation, &work->job))
 		refuse(work);
 }
@@ -297,9 +263,6 @@ enum MHD_Result route_render(struct request *request)
 		return response_send_problem(request);
 	if (!describe(work, request->service))
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
-	if (!request->is_post && entity_tag_matches(request_header(request, "If-None-Match"), work->tag))
-		return send_image(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
-	if (request->is_head)
-		return send_image(request, MHD_HTTP_OK, response_create_unsized());
-	return enqueue(request, deadline_ms);
+	enum MHD_Result result;
+	return call_answer_at_once(request, work->tag, send_image, &result) ? result : enqueue(request, deadline_ms);
 }

@@ -203,6 +203,27 @@ def test_every_call_answers(daemon, example_asset, path, method):
         assert_conforms(answer.json, schema)
 
 
+@pytest.mark.parametrize("path", CONTRACT["paths"])
+def test_methods(daemon, path):
+    """The contract lists the methods that an address takes, no more and no fewer."""
+    allowed = daemon.request("PATCH", EXAMPLES.get(path, path)).headers["Allow"]
+    assert set(allowed.split(", ")) == {method.upper() for method in CONTRACT["paths"][path] if method in METHODS}
+
+
+@pytest.mark.parametrize("path", CONTRACT["paths"])
+def test_unknown_query(daemon, example_asset, path):
+    """Members that a call does not know are refused, whatever the method; what is no call leaves its query unread."""
+    target = EXAMPLES.get(path, path)
+    target += ("&" if "?" in target else "?") + "x=1"
+    for method in ("GET", "HEAD") + (("DELETE",) if "delete" in CONTRACT["paths"][path] else ()):
+        answer = daemon.request(method, target)
+        assert answer.status == (422 if path.startswith("/v1/") else 200), method
+        if method != "HEAD" and answer.status == 422:
+            assert answer.pointers == {"/x"}
+    if "put" in CONTRACT["paths"][path]:
+        assert daemon.request("PUT", target, PNG).pointers == {"/x"}
+
+
 def names_of(value):
     return {name: names_of(inner) for name, inner in value.items()} if isinstance(value, dict) else None
 

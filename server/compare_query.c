@@ -1,13 +1,11 @@
 #include "server/compare_query.h"
 
 #include "renderer/image/regions.h"
-#include "server/scene_canonical.h"
 #include "server/scene_json.h"
 #include "server/scene_rules.h"
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { POINTER_SIZE = 512 };
@@ -356,40 +354,12 @@ void compare_query_read(const json_t *root, struct compare_query *query, struct 
 		read_regions(root, query, problem);
 }
 
-/* The scene without what the model alone decides. */
-static char *describe_without_model(const struct scene *scene)
+struct scene compare_query_mask(const struct compare_query *query)
 {
-	const struct scene usual = scene_default();
-	struct scene plain = *scene;
-	plain.model = usual.model;
-	plain.model.optics = scene->model.optics;
-	plain.radiosity = usual.radiosity;
-	plain.output.layers = 1u << LAYER_COLOR;
-	return scene_canonical(&plain);
-}
-
-static bool shows_the_same(const struct scene *a, const struct scene *b)
-{
-	char *first = describe_without_model(a), *second = describe_without_model(b);
-	const bool same = first && second && strcmp(first, second) == 0;
-	free(first);
-	free(second);
-	return same;
-}
-
-int compare_query_mask(const struct compare_query *query, struct scene *mask)
-{
-	const struct scene *truth = &query->variant[query->truth].input.scene;
-	if (truth->model.name == MODEL_SLAB)
-		return query->truth;
-	for (int i = 0; i < query->variant_count; i++) {
-		const struct scene *scene = &query->variant[i].input.scene;
-		if (scene->model.name == MODEL_SLAB && shows_the_same(scene, truth))
-			return i;
-	}
-	*mask = *truth;
-	mask->model = scene_default().model;
-	mask->model.optics = truth->model.optics;
-	mask->radiosity.enabled = false; /* its light is not looked at */
-	return -1;
+	struct scene mask = query->variant[query->truth].input.scene;
+	const enum optics_model optics = mask.model.optics;
+	mask.model = scene_default().model;
+	mask.model.optics = optics;
+	mask.output.layers = REGIONS_LAYERS;
+	return mask;
 }

@@ -51,8 +51,8 @@ void compare_query_pointer(const json_t *root, int variant, const char *member, 
 /* Adds what is wrong with a variant's scene to the problem of the body. */
 void compare_query_add(const json_t *root, int variant, const struct problem *of_scene, struct problem *problem);
 
-/* The index of the variant whose picture tells cloud, sky and ground: the truth, or one that differs from it in the model alone; -1: none
- * is a slab, and *mask is then the truth's scene as one. Once the assets are found. */
-int compare_query_mask(const struct compare_query *query, struct scene *mask);
+/* The scene whose layers tell cloud, sky and ground: the truth's as a slab. A render of its own, since a picture that is rendered beside
+ * other layers differs in its last digits from the one that people see. */
+struct scene compare_query_mask(const struct compare_query *query);
 
 #endif

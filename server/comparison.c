@@ -100,8 +100,8 @@ static bool flip_all(struct comparison *comparison, renderer_cancelled *cancelle
 	return ok;
 }
 
-bool comparison_run(const struct compare_query *query, const struct frame *const *frames, const struct scene *mask_scene,
-		    const struct frame *masked, renderer_cancelled *cancelled, void *context, struct comparison *comparison)
+bool comparison_run(const struct compare_query *query, const struct frame *const *frames, const struct frame *masked,
+		    renderer_cancelled *cancelled, void *context, struct comparison *comparison)
 {
 	const struct frame *truth = frames[query->truth];
 	*comparison = (struct comparison){.query = query, .width = truth->width, .height = truth->height};
@@ -109,7 +109,7 @@ bool comparison_run(const struct compare_query *query, const struct frame *const
 	comparison->mask = malloc((size_t)truth->width * (size_t)truth->height);
 	if (!comparison->mask)
 		return false;
-	regions_find(mask_scene, masked, comparison->mask);
+	regions_find(truth_scene(query), masked, comparison->mask);
 	for (int i = 0; i < query->variant_count; i++) {
 		comparison->frame[i] = frames[i];
 		if (cancelled(context) || !develop(comparison, i))

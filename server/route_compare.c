@@ -7,6 +7,7 @@
 
 #include "renderer/image/regions.h"
 #include "renderer/log.h"
+#include "server/call.h"
 #include "server/clock.h"
 #include "server/compare_query.h"
 #include "server/comparison.h"
@@ -23,7 +24,7 @@
 enum compare_form { FORM_JSON, FORM_PNG, FORM_EXR };
 static const char *const form_types[] = {"application/json", "image/png", "image/x-exr", NULL};
 
-/* A variant, and the slab's view of the truth where no variant has that. */
+/* The variants, and the slab's layers of the truth. */
 enum { RUNS_MAX = COMPARE_VARIANTS_MAX + 1, MASK_RUN = COMPARE_VARIANTS_MAX };
 
 struct compare_run {
@@ -44,11 +45,10 @@ struct compare_work {
 	struct compare_run run[RUNS_MAX];
 	int order[RUNS_MAX], run_count; /* indices of runs as they are rendered */
 	int done;                       /* so many of them */
-	int mask_run;                   /* the one that tells regions; negative: nobody asks */
 	double deadline_ms;
-	bool refused; /* too much waits */
-	enum render_outcome outcome;
-	struct timings spent; /* by comparing and encoding */
+	bool refused;             /* too much waits */
+	struct render_job *ended; /* the last, or the one that failed; its outcome is that of the whole */
+	struct timings spent;     /* by comparing and encoding */
 	struct image_buffer answer;
 };
 
@@ -118,15 +118,12 @@ static void read_body(struct request *request, struct compare_work *work)
 static void plan(struct compare_work *work)
 {
 	const struct compare_query *query = &work->query;
-	const int masked = query->has_masks ? compare_query_mask(query, &work->mask_scene) : 0;
-	work->mask_run = !query->has_masks ? -1 : masked < 0 ? MASK_RUN : masked;
-	if (work->mask_run == MASK_RUN) {
+	if (query->has_masks) {
+		work->mask_scene = compare_query_mask(query);
 		init_run(work, MASK_RUN, &work->mask_scene);
 		scene_assets_find(work->request->service->assets, &work->mask_scene, &work->run[MASK_RUN].assets, &work->request->problem);
 		work->order[work->run_count++] = MASK_RUN;
 	}
-	if (work->mask_run >= 0)
-		work->run[work->mask_run].scene->output.layers |= REGIONS_LAYERS;
 	for (int reference = 0; reference < 2; reference++)
 		for (int i = 0; i < query->variant_count; i++)
 			if ((query->variant[i].input.scene.model.name == MODEL_REFERENCE) == reference)
@@ -153,26 +150,10 @@ static enum MHD_Result send_answer(struct request *request)
 static enum MHD_Result finish(struct request *request)
 {
 	struct compare_work *work = request->work;
-	if (work->refused) {
-		if (request->service->stopping)
-			return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
-		metrics_count_rejection(request->service->metrics, REJECTED_FULL);
-		return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "%d renders are waiting, and no more may.",
-						 request->service->config->queue_length);
-	}
-	switch (work->outcome) {
-	case RENDER_OUTCOME_EXPIRED:
-		return response_send_new_problem(request, PROBLEM_DEADLINE, "The comparison was not ready within its deadline.");
-	case RENDER_OUTCOME_ABANDONED:
-		return MHD_NO;
-	case RENDER_OUTCOME_NO_MEMORY:
-		return response_send_new_problem(request, PROBLEM_NO_MEMORY, "There is no memory for pictures of this size now.");
-	case RENDER_OUTCOME_FAILED:
-		return response_send_new_problem(request, PROBLEM_RENDER_FAILED,
-						 "The comparison could not be made. The log has the reason under %s.", request->id);
-	case RENDER_OUTCOME_OK:
-		break;
-	}
+	if (work->refused)
+		return call_refuse_render(request);
+	if (work->ended->outcome != RENDER_OUTCOME_OK)
+		return call_send_render_failure(request, work->ended->outcome, "The comparison", "pictures of this size");
 	return send_answer(request);
 }
 
@@ -180,13 +161,7 @@ static enum MHD_Result finish(struct request *request)
 
 static void hand_back(struct compare_work *work)
 {
-	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
-						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
-						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
-						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
-	if (!work->refused && work->outcome != RENDER_OUTCOME_OK)
-		metrics_count_end(work->request->service->metrics, ends[work->outcome]);
-	request_resume(work->request);
+	call_end_render(work->request, work->ended);
 }
 
 static void refuse(struct compare_work *work)
@@ -195,28 +170,14 @@ static void refuse(struct compare_work *work)
 	request_resume(work->request);
 }
 
-static bool is_unwanted(const struct compare_work *work)
-{
-	return work->request->service->giving_up || request_is_abandoned(work->request);
-}
-
 static bool job_is_abandoned(struct render_job *job)
 {
-	return is_unwanted(((const struct compare_run *)((char *)job - offsetof(struct compare_run, job)))->work);
+	return call_is_abandoned(((const struct compare_run *)((char *)job - offsetof(struct compare_run, job)))->work->request);
 }
 
 static bool job_is_over(void *context)
 {
 	return render_job_is_over(context);
-}
-
-static bool comparing_is_over(void *context)
-{
-	struct compare_work *work = context;
-	const bool expired = clock_now_ms() >= work->deadline_ms, over = expired || is_unwanted(work);
-	if (over)
-		work->outcome = expired ? RENDER_OUTCOME_EXPIRED : RENDER_OUTCOME_ABANDONED;
-	return over;
 }
 
 static bool encode(struct compare_work *work, const struct comparison *comparison)
@@ -242,22 +203,21 @@ static void compare(struct work *base)
 	struct compare_work *work = (struct compare_work *)((char *)base - offsetof(struct compare_work, compare));
 	const struct frame *frames[COMPARE_VARIANTS_MAX];
 	struct comparison comparison;
-	const struct compare_run *masked = work->mask_run < 0 ? NULL : &work->run[work->mask_run];
 	for (int i = 0; i < work->query.variant_count; i++)
 		frames[i] = &work->run[i].job.frame;
 	const double start = clock_now_ms();
-	work->outcome = RENDER_OUTCOME_NO_MEMORY; /* unless something else turns up */
-	bool ok = comparison_run(&work->query, frames, masked ? masked->scene : work->run[work->query.truth].scene,
-				 masked ? &masked->job.frame : NULL, comparing_is_over, work, &comparison);
+	work->ended->outcome = RENDER_OUTCOME_NO_MEMORY; /* unless something else turns up */
+	bool ok = comparison_run(&work->query, frames, work->query.has_masks ? &work->run[MASK_RUN].job.frame : NULL, job_is_over,
+				 work->ended, &comparison);
 	const double compared = clock_now_ms();
 	timings_set(&work->spent, TIMING_COMPARE, compared - start);
 	if (ok) {
 		ok = encode(work, &comparison);
-		work->outcome = ok ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
+		work->ended->outcome = ok ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
 		timings_set(&work->spent, TIMING_ENCODE, clock_now_ms() - compared);
 	}
 	if (ok)
-		comparing_is_over(work);
+		job_is_over(work->ended);
 	comparison_finish(&comparison);
 	hand_back(work);
 }
@@ -285,7 +245,7 @@ static void on_rendered(struct render_job *job)
 	struct service *service = work->request->service;
 	preparation_release(service->preparation, job);
 	scene_assets_release(run->scene);
-	work->outcome = job->outcome;
+	work->ended = job;
 	if (job->outcome == RENDER_OUTCOME_FAILED)
 		log_error("request %s: rendering failed", work->request->id);
 	if (job->outcome != RENDER_OUTCOME_OK) {
@@ -316,7 +276,7 @@ static void decode(struct work *base)
 	run->job.outcome = RENDER_OUTCOME_FAILED;
 	if (render_job_is_over(&run->job) ||
 	    !scene_assets_decode(service->maps, service->images, run->scene, &run->assets, job_is_over, &run->job, run->decode_ms)) {
-		work->outcome = run->job.outcome;
+		work->ended = &run->job;
 		hand_back(work);
 	} else if (!push(work, run)) {
 		refuse(work);

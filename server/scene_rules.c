@@ -126,13 +126,19 @@ static void check_camera(const struct scene_input *input, struct problem *proble
 			    clouds->base_m, clouds->base_m + clouds->thickness_m);
 }
 
-static void check_model(const struct scene_input *input, struct problem *problem)
+/* Any scene may be rendered as its own reference, which has no use for what the slab is told of shading and radiosity: it is put back to
+ * what it usually is, since it must not make two scenes of one. */
+static void check_model(struct scene_input *input, struct problem *problem)
 {
 	static const char *const sampling[] = {"samples", "time_budget_ms", "seed", "partial", NULL};
-	const struct scene *scene = &input->scene;
-	const bool known = !problem_mentions(problem, "/model/name") || scene->model.name == MODEL_REFERENCE;
-	if (known && scene->model.name != MODEL_REFERENCE)
+	struct scene *scene = &input->scene;
+	const bool known = !problem_mentions(problem, "/model/name");
+	if (scene->model.name == MODEL_REFERENCE) {
+		scene->model.shading = scene_default().model.shading;
+		scene->radiosity = scene_default().radiosity;
+	} else if (known) {
 		refuse_given(input, "model", sampling, "goes with the model reference only", problem);
+	}
 }
 
 /* One side of a picture that follows from the other. Both have the same range; `ratio` is that side's to the other's. */

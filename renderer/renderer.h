@@ -58,6 +58,9 @@ struct frame {
 	void *pixels; /* malloc'd */
 	size_t bytes;
 
+	int samples;  /* light paths behind every pixel, at least; 0: another model than the reference */
+	bool partial; /* fewer than were asked for, because the request was cancelled */
+
 	struct stage_timing timing[STAGE_COUNT];
 	int radiosity_passes;      /* 0 when not run */
 	double radiosity_residual; /* light on its way when the exchange stopped, over what the ground receives; 0 when not run */

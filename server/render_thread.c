@@ -25,18 +25,27 @@ struct render_thread {
 	int failures; /* on end */
 };
 
+/* Who asks is alive: what may take minutes, a reference, is no hang as long as it does. */
+struct running_job {
+	struct render_thread *thread;
+	struct render_job *job;
+};
+
 static bool is_cancelled(void *context)
 {
-	return render_job_is_over(context);
+	const struct running_job *running = context;
+	running->thread->busy_since_ms = clock_now_ms();
+	return render_job_is_over(running->job);
 }
 
 static enum render_outcome render(struct render_thread *thread, struct render_job *job)
 {
 	if (render_job_is_over(job))
 		return job->outcome;
+	struct running_job running = {thread, job};
 	enum render_result result =
-		job->directions ? renderer_sky_light(thread->renderer, job->scene, job->directions, is_cancelled, job, &job->light)
-				: renderer_render(thread->renderer, job->scene, is_cancelled, job, &job->frame);
+		job->directions ? renderer_sky_light(thread->renderer, job->scene, job->directions, is_cancelled, &running, &job->light)
+				: renderer_render(thread->renderer, job->scene, is_cancelled, &running, &job->frame);
 	if (result == RENDER_CANCELLED)
 		return job->outcome;
 	/* A scene that does not fit says nothing about the next one: only a failing device turns the daemon's health. */
@@ -57,7 +66,7 @@ static void run_jobs(struct render_thread *thread)
 		thread->busy_since_ms = start;
 		job->outcome = render(thread, job);
 		double took = clock_now_ms() - start;
-		if (job->outcome == RENDER_OUTCOME_OK)
+		if (job->outcome == RENDER_OUTCOME_OK && job->scene->model.name == MODEL_SLAB)
 			thread->typical_ms = thread->typical_ms > 0 ? 0.7 * thread->typical_ms + 0.3 * took : took;
 		thread->busy_since_ms = 0;
 		job->finished(job);

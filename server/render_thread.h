@@ -26,7 +26,7 @@ const struct renderer_info *render_thread_info(const struct render_thread *threa
 const struct kernel *render_thread_kernel(const struct render_thread *thread);
 struct droplet_store *render_thread_droplets(const struct render_thread *thread);
 
-/* Milliseconds the running job has taken so far, 0 when idle. Any thread. */
+/* Milliseconds since the running job began or last asked whether it is over, 0 when idle. Any thread. */
 double render_thread_busy_ms(const struct render_thread *thread);
 
 /* A typical job's milliseconds lately, 0 before the first. Any thread. */

@@ -13,6 +13,7 @@
 #include "server/comparison.h"
 #include "server/json_document.h"
 #include "server/negotiation.h"
+#include "server/reference_limits.h"
 #include "server/response.h"
 #include "server/scene_assets.h"
 #include "server/service.h"
@@ -73,12 +74,13 @@ static void init_run(struct compare_work *work, int index, struct scene *scene)
 	scene_assets_init(&work->run[index].assets);
 }
 
-static void find_assets(struct compare_work *work, const json_t *root)
+static void check_variants(struct compare_work *work, const json_t *root)
 {
 	struct request *request = work->request;
 	for (int i = 0; i < work->query.variant_count; i++) {
 		struct problem own = {0};
 		init_run(work, i, &work->query.variant[i].input.scene);
+		reference_limits_check(request->service->config, work->run[i].scene, &own);
 		scene_assets_find(request->service->assets, work->run[i].scene, &work->run[i].assets, &own);
 		compare_query_add(root, i, &own, &request->problem);
 		problem_finish(&own);
@@ -93,7 +95,7 @@ static void read_json(struct compare_work *work)
 		return;
 	compare_query_read(root, &work->query, &request->problem);
 	if (request->problem.kind == PROBLEM_NONE)
-		find_assets(work, root);
+		check_variants(work, root);
 	json_decref(root);
 }
 

@@ -12,6 +12,7 @@
 #include "server/json_document.h"
 #include "server/negotiation.h"
 #include "server/query.h"
+#include "server/reference_limits.h"
 #include "server/response.h"
 #include "server/scene_assets.h"
 #include "server/scene_canonical.h"
@@ -20,7 +21,9 @@
 #include "server/scene_rules.h"
 #include "server/service.h"
 
+#include <math.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,6 +37,7 @@ struct render_work {
 	double decoding_since_ms, decode_ms[SCENE_ASSETS_COUNT];
 	char *canonical, *location;
 	char key[DIGEST_SIZE], tag[ENTITY_TAG_SIZE];
+	double deadline_ms;
 	bool refused; /* the queue was full */
 	struct image_buffer image;
 	double encode_ms;
@@ -100,6 +104,7 @@ static void read_scene(struct request *request, struct render_work *work)
 	enum image_format *format = &input->scene.output.format;
 	bool acceptable = negotiation_choose(request_header(request, "Accept"), *format, format);
 	scene_rules_apply(input, &request->problem);
+	reference_limits_check(request->service->config, &input->scene, &request->problem);
 	scene_assets_find(request->service->assets, &input->scene, &work->assets, &request->problem);
 	if (!acceptable)
 		problem_set(&request->problem, PROBLEM_NOT_ACCEPTABLE, "The image would be %s, which the Accept header excludes.",
@@ -128,14 +133,27 @@ static enum MHD_Result send_image(struct request *request, unsigned status, stru
 	const struct render_work *work = request->work;
 	if (status == MHD_HTTP_OK)
 		response_set(response, "Content-Type", image_content_types[work->input.scene.output.format]);
-	response_set(response, "ETag", work->tag);
-	response_set(response, "Vary", "Accept");
 	/* The content of a map may change behind its name. */
 	const bool named = *work->input.scene.clouds.map.name || *work->input.scene.ground.map.name;
-	response_set(response, "Cache-Control", named ? CACHE_ASK : CACHE_KEEP);
+	const bool timed = reference_is_timed(&work->input.scene);
+	if (!timed)
+		response_set(response, "ETag", work->tag);
+	response_set(response, "Vary", "Accept");
+	response_set(response, "Cache-Control", timed ? CACHE_NONE : named ? CACHE_ASK : CACHE_KEEP);
 	response_set(response, "X-Scene-Key", work->key);
 	response_set(response, "Content-Location", work->location);
 	return response_send(request, status, response);
+}
+
+/* How far a reference came. */
+static void set_samples(struct MHD_Response *response, const struct frame *frame)
+{
+	char number[16];
+	snprintf(number, sizeof number, "%d", frame->samples);
+	if (frame->samples > 0)
+		response_set(response, "Stratus-Samples", number);
+	if (frame->partial)
+		response_set(response, "Stratus-Partial", "true");
 }
 
 static enum MHD_Result finish(struct request *request)
@@ -153,6 +171,7 @@ static enum MHD_Result finish(struct request *request)
 	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
 	struct MHD_Response *response = response_create((char *)work->image.data, work->image.size);
 	work->image.data = NULL;
+	set_samples(response, &work->job.frame);
 	enum MHD_Result result = send_image(request, MHD_HTTP_OK, response);
 	metrics_count_timings(request->service->metrics, &request->timings);
 	return result;
@@ -173,13 +192,17 @@ static void encode(struct work *base)
 		.scene_json = work->canonical, .request_id = work->request->id, .software = "stratus " RENDERER_VERSION};
 	char error[256] = "";
 	double start = clock_now_ms();
-	if (start >= work->job.deadline_ms) {
+	/* What was cut short for the deadline goes out, even if that passes now. */
+	const double deadline_ms = work->job.frame.partial ? INFINITY : work->deadline_ms;
+	if (work->job.frame.partial && request_is_abandoned(work->request)) {
+		work->job.outcome = RENDER_OUTCOME_ABANDONED;
+	} else if (start >= deadline_ms) {
 		work->job.outcome = RENDER_OUTCOME_EXPIRED;
 	} else if (!work->request->service->images->encode(&work->job.frame, &work->input.scene, &metadata, &work->image, error,
 							   sizeof error)) {
 		log_error("request %s: encoding failed: %s", work->request->id, error);
 		work->job.outcome = RENDER_OUTCOME_FAILED;
-	} else if (clock_now_ms() >= work->job.deadline_ms) {
+	} else if (clock_now_ms() >= deadline_ms) {
 		work->job.outcome = RENDER_OUTCOME_EXPIRED;
 	}
 	work->encode_ms = clock_now_ms() - start;
@@ -233,7 +256,8 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	struct render_work *work = request->work;
 	struct service *service = request->service;
 	work->job.scene = &work->input.scene;
-	work->job.deadline_ms = deadline_ms;
+	work->deadline_ms = deadline_ms;
+	work->job.deadline_ms = reference_stop_ms(&work->input.scene, clock_now_ms(), deadline_ms);
 	work->job.abandoned = is_abandoned;
 	work->job.finished = on_rendered;
 	work->encode.run = encode;
@@ -264,5 +288,7 @@ enum MHD_Result route_render(struct request *request)
 	if (!describe(work, request->service))
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
 	enum MHD_Result result;
+	if (reference_is_timed(&work->input.scene) && !request->is_head)
+		return enqueue(request, deadline_ms); /* no two of them need be the same */
 	return call_answer_at_once(request, work->tag, send_image, &result) ? result : enqueue(request, deadline_ms);
 }

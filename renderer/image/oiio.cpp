@@ -145,6 +145,10 @@ bytes encode_png(const struct frame &frame, const struct scene &scene, const str
 		png_insert_text(png, "stratus:comparison", metadata.comparison);
 	else
 		png_insert_text(png, "stratus:scene", metadata.scene_json);
+	if (frame.samples > 0) {
+		png_insert_text(png, "stratus:partial", frame.partial ? "true" : "false");
+		png_insert_text(png, "stratus:samples", std::to_string(frame.samples).c_str());
+	}
 	return png;
 }
 
@@ -335,6 +339,10 @@ void describe_frame(ImageSpec &spec, const struct frame &frame)
 	spec.attribute("stratus:global_illuminance_lux", static_cast<float>(frame.global_illuminance_lux));
 	spec.attribute("stratus:direct_illuminance_lux", static_cast<float>(frame.direct_illuminance_lux));
 	spec.attribute("stratus:diffuse_illuminance_lux", static_cast<float>(frame.diffuse_illuminance_lux));
+	if (frame.samples > 0) {
+		spec.attribute("stratus:samples", frame.samples);
+		spec.attribute("stratus:partial", frame.partial ? 1 : 0);
+	}
 }
 
 /* Rows y..y_end as the file has them: pixel by pixel, each channel in its own type. */

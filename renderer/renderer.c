@@ -7,6 +7,7 @@
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/illuminance.h"
+#include "renderer/stages/reference.h"
 #include "renderer/stages/sun_cover.h"
 #include "renderer/stages/sea.h"
 
@@ -26,6 +27,7 @@ struct renderer {
 	struct field_stage field;
 	struct radiosity_stage radiosity;
 	struct view_stage view;
+	struct reference_stage reference;
 	struct illuminance_stage illuminance;
 	struct sun_cover_stage sun_cover;
 	struct sea_stage sea;
@@ -40,6 +42,7 @@ static bool compile_stages(struct renderer *renderer, const struct pass_compiler
 {
 	ground_stage_init(&renderer->ground, compiler);
 	sea_stage_init(&renderer->sea, compiler);
+	reference_stage_init(&renderer->reference, compiler);
 	illuminance_stage_init(&renderer->illuminance, compiler);
 	sun_cover_stage_init(&renderer->sun_cover, compiler);
 	return sky_stage_init(&renderer->sky, compiler) && field_stage_init(&renderer->field, compiler) &&
@@ -51,6 +54,7 @@ static void finish_stages(struct renderer *renderer)
 	sun_cover_stage_finish(&renderer->sun_cover);
 	illuminance_stage_finish(&renderer->illuminance);
 	sea_stage_finish(&renderer->sea);
+	reference_stage_finish(&renderer->reference);
 	view_stage_finish(&renderer->view);
 	radiosity_stage_finish(&renderer->radiosity);
 	field_stage_finish(&renderer->field);
@@ -341,6 +345,42 @@ static bool run_sea(struct job *job, struct view_inputs *inputs)
 	return inputs->sea_sky;
 }
 
+/* The clear sky as a path sees it that ends at some height. Leaves the block as it was. */
+static const struct texture *sky_from(struct job *job, double height)
+{
+	struct stage_context *context = &job->renderer->context;
+	const struct scene_block kept = context->block;
+	struct scene scene = *job->scene;
+	struct sky_tables sky;
+	double albedo[3];
+	mean_albedo(job, albedo);
+	scene.camera.position_m[2] = height;
+	context->block.camera_position[2] = (float)height;
+	const bool ok = sky_stage_run(&job->renderer->sky, context, &scene, albedo, &sky);
+	context->block = kept;
+	stage_upload_block(context);
+	return ok ? sky.total : NULL;
+}
+
+/* Cancelled or not: what there is is a picture from here on. */
+static bool run_reference(struct job *job, const struct view_inputs *view)
+{
+	const struct scene *scene = job->scene;
+	struct reference_result result;
+	const struct reference_inputs inputs = {.view = view,
+						.sky_at_layer = sky_from(job, scene->clouds.base_m + scene->clouds.thickness_m),
+						.sky_at_ground = sky_from(job, 0.1)};
+	if (!inputs.sky_at_layer || !inputs.sky_at_ground ||
+	    !reference_stage_run(&job->renderer->reference, &job->renderer->context, scene, &inputs, job->frame->layer,
+				 job->frame->layer_count, job->cancelled, job->cancel_context, job->pictures, &result))
+		return false;
+	job->frame->samples = result.samples;
+	job->frame->partial = result.stopped;
+	if (result.stopped)
+		job->cancelled = NULL;
+	return true;
+}
+
 static bool run_view(struct job *job)
 {
 	struct renderer *renderer = job->renderer;
@@ -367,8 +407,10 @@ static bool run_view(struct job *job)
 	frame->layer_count = list_layers(job->scene, frame->layer);
 	if (job->scene->ground.type == GROUND_SEA && !run_sea(job, &inputs))
 		return false;
-	if (!view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
-			    job->cancel_context, job->pictures))
+	const bool reference = job->scene->model.name == MODEL_REFERENCE && job->clouds;
+	if (reference ? !run_reference(job, &inputs)
+		      : !view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
+					job->cancel_context, job->pictures))
 		return false;
 	if (output->format != IMAGE_PNG)
 		return true;

@@ -14,16 +14,21 @@
 struct setting {
 	const char *name;
 	size_t offset;
-	const char *const *words; /* enumerations are stored as int; NULL for a double */
+	const char *const *words; /* enumerations are stored as int; NULL for a number */
+	bool whole;               /* an int, else a double */
 };
 
 #define NUMBER(name, member)                                                                                                               \
 	{                                                                                                                                  \
-		name, offsetof(struct scene, member), NULL                                                                                 \
+		name, offsetof(struct scene, member), NULL, false                                                                          \
+	}
+#define WHOLE(name, member)                                                                                                                \
+	{                                                                                                                                  \
+		name, offsetof(struct scene, member), NULL, true                                                                           \
 	}
 #define WORD(name, member, words)                                                                                                          \
 	{                                                                                                                                  \
-		name, offsetof(struct scene, member), words                                                                                \
+		name, offsetof(struct scene, member), words, false                                                                         \
 	}
 
 static const struct setting settings[] = {
@@ -56,6 +61,10 @@ static const struct setting settings[] = {
 	WORD("camera.projection", camera.projection, scene_projection_names),
 	WORD("camera.face", camera.face, scene_face_names),
 	NUMBER("radiosity.tolerance", radiosity.tolerance),
+	WORD("model.name", model.name, scene_model_names),
+	WHOLE("model.samples", model.samples),
+	WHOLE("model.seed", model.seed),
+	NUMBER("model.time_budget_ms", model.time_budget_ms),
 	WORD("model.shading", model.shading, scene_shading_names),
 	WORD("model.optics", model.optics, scene_optics_names),
 };
@@ -82,7 +91,11 @@ static bool apply(struct scene *scene, const char *text)
 		if (!s->words) {
 			char *end;
 			const double number = strtod(equals + 1, &end);
-			memcpy(at, &number, sizeof number);
+			const int whole = (int)number;
+			if (s->whole)
+				memcpy(at, &whole, sizeof whole);
+			else
+				memcpy(at, &number, sizeof number);
 			return *end == 0 && end != equals + 1;
 		}
 		for (int k = 0; s->words[k]; k++)

@@ -65,6 +65,9 @@ void view_stage_finish(struct view_stage *stage);
  */
 void view_fill_block(struct scene_block *block, const struct scene *scene);
 
+/* Those of a view alone. */
+void view_fill_camera(struct scene_block *block, const struct scene *scene, const struct camera_view *view);
+
 /* Renders layers[0..count) into textures of the output's size (RGBA32F), owned by the cache and valid for this frame. cancelled may be
  * NULL; it is asked between passes. false when cancelled, out of memory, or when a program does not compile. */
 bool view_stage_run(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,

@@ -1,0 +1,151 @@
+// How a light path finds the sun.
+//
+// Droplets scatter half of all light by less than 5 degrees. Looking from every scattering straight at the sun would find, once in a thousand times, one that scatters into
+// the middle of that peak, and leave a bright speck. So light is sorted by its last scattering beyond the peak, seen from the camera: from there on it goes to the sun by
+// forward scatterings alone, and that rest is drawn from the sun's side, where its directions come of the peak itself. What is left to evaluate is the phase function
+// outside the peak. Only paths that met nothing but forward scatterings (order 0) look at the sun through the peak.
+//
+// Number and places of the forward scatterings are drawn for the cloud that is expected towards the sun, those places a Poisson process on the way; what cloud there
+// really is decides about their weight, and ratio tracking (Novak, Selle and Jarosz 2014, "Residual Ratio Tracking") about what the way lets through beside.
+#ifndef SHADERS_LIB_LIGHT_PATH_SUN
+#define SHADERS_LIB_LIGHT_PATH_SUN
+#include "shaders/lib/light_path.glsl"
+
+// The table of chains: so many of them, each with so many directions, from the sun's disc (0) on backwards, texel by texel; a row holds 64 chains, each hero has as many rows. x, y: sine
+// from the middle of the sun along two axes; z, w: densities of the next two bands, in turn, over the hero's.
+const int PATH_CHAIN_LENGTH = 16;
+const int PATH_CHAIN_ROWS = 64;
+// Where no cloud is expected there may be some: share of the forward scatterings looked for close behind what is expected, m.
+const float PATH_LIKELY = 0.25;
+const float PATH_LIKELY_REACH = 100.0;
+
+// Of the way behind that.
+float path_sun_unlikely(vec3 spans)
+{
+	return clamp(15.0 / max(spans.z - spans.y, 1.0), 0.001, 0.05);
+}
+
+// Ways weighed by the share of scatterings that are looked for on them.
+vec3 path_sun_weights(vec3 spans)
+{
+	float likely = spans.x + PATH_LIKELY * (spans.y - spans.x);
+	return vec3(spans.x, likely, likely + path_sun_unlikely(spans) * (spans.z - spans.y));
+}
+
+// Draws where the path is scattered next.
+void path_sun_draw_next(INOUT(light_path) path)
+{
+	vec3 weights = path_sun_weights(path.spans);
+	if (path.left == 0) {
+		path.next = 1e9;
+	} else {
+		float share = pow(path_random(path), 1.0 / float(path.left));
+		path.weight = mix(weights.z, path.weight, share);
+		float behind = path.spans.y + (path.weight - weights.y) / path_sun_unlikely(path.spans);
+		float close = path.spans.x + (path.weight - weights.x) / PATH_LIKELY;
+		path.next = path.weight < weights.x ? path.weight : path.weight < weights.y ? close : behind;
+	}
+}
+
+vec4 path_sun_texel(light_path path)
+{
+	return texelFetch(forward_chains, path.chain + ivec2(path.left, 0), 0);
+}
+
+vec3 path_sun_direction(light_path path, vec4 texel)
+{
+	vec3 sun = vec3(sun_direction);
+	float s = sun.z < 0.0 ? -1.0 : 1.0;
+	float a = -1.0 / (s + sun.z);
+	float b = sun.x * sun.y * a;
+	vec3 x = vec3(1.0 + s * sun.x * sun.x * a, s * b, -s * sun.x);
+	vec3 y = vec3(b, s + sun.y * sun.y * a, -sun.y);
+	vec2 aside = vec2(texel.x * path.turn.x - texel.y * path.turn.y, texel.x * path.turn.y + texel.y * path.turn.x);
+	return sun * sqrt(max(1.0 - dot(aside, aside), 0.0)) + x * aside.x + y * aside.y;
+}
+
+vec3 path_sun_ratio(light_path path, vec4 texel)
+{
+	return path.hero == 0 ? vec3(1.0, texel.z, texel.w) : path.hero == 1 ? vec3(texel.w, 1.0, texel.z) : vec3(texel.z, texel.w, 1.0);
+}
+
+// How far the layer reaches towards the sun from a place in it: x, cloud by what stands there; y, the layer itself.
+vec2 path_sun_reach(vec3 place, float height, float mu_sun, float top)
+{
+	float mu = mu_sun < 0.0 ? min(mu_sun, -0.01) : max(mu_sun, 0.01);
+	float base = cloud_layer.x;
+	return mu < 0.0 ? vec2((base - height) / mu) : max(vec2(base + top - height, base + cloud_layer.y - height) / mu, vec2(0.0));
+}
+
+// Begins to look for the sun. place: where the straight way to the sun enters the layer; height above ground, cosine of the sun there. The number of forward
+// scatterings is drawn, and with it the direction to begin with. Returns what the way brings by itself, densities included, per band; 0: not worth looking.
+vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_sun)
+{
+	float hero_extinction = path_of_hero(vec3(extinction), path.hero);
+	float hero_modified = path_of_hero(vec3(extinction_modified), path.hero);
+	vec3 peak = vec3(extinction) - vec3(extinction_modified);
+	float hero_peak = path_of_hero(peak, path.hero);
+	float longest = 8.0 / hero_peak;
+	vec2 reach = path_sun_reach(place, height, mu_sun, path_top(place));
+	vec3 out_there = place + vec3(sun_direction) * min(reach.x, longest);
+	reach.x = min(reach.x, path_sun_reach(place, height, mu_sun, path_top(out_there)).x);
+	float expected = min(reach.x, longest);
+	path.spans = vec3(expected, min(expected + PATH_LIKELY_REACH, reach.y), reach.y);
+	path.arc = 0.0;
+	path.weight = 0.0;
+
+	float patience = clamp(4.0 * exp(-hero_modified * expected), 0.03, 1.0);
+	bool looks = path_random(path) < patience;
+	// Poisson's law by inversion.
+	float way = path_sun_weights(path.spans).z;
+	float mean = hero_peak * way;
+	float term = exp(-mean);
+	float sum = term;
+	float share = path_random(path);
+	int count = 0;
+	for (int i = 1; i <= PATH_CHAIN_LENGTH; i++) {
+		if (share > sum) {
+			count = i;
+			term *= mean / float(i);
+			sum += term;
+		}
+	}
+	path.left = min(count, PATH_CHAIN_LENGTH - 1);
+	uint which = uint(path_random(path) * 4096.0);
+	float around = 2.0 * PI * path_random(path);
+	path.chain = ivec2(int(which & 63u) * PATH_CHAIN_LENGTH, int(which >> 6u) + PATH_CHAIN_ROWS * path.hero);
+	path.turn = vec2(cos(around), sin(around));
+	vec4 texel = path_sun_texel(path);
+	path.direction = path_sun_direction(path, texel);
+	// More forward scatterings than a chain holds are left out: a share of 1e-5 of what gets through so much cloud at all.
+	vec3 lets = exp(vec3(mean) - vec3(extinction) * expected) / patience;
+	vec3 densities = path_sun_ratio(path, texel) * exp((vec3(hero_peak) - peak) * way);
+	path_sun_draw_next(path);
+	// The way's own density stands in path_weight as exp(-peak way), of which `lets` holds the hero's inverse.
+	vec3 own = path_sun_ratio(path, texel);
+	vec3 weight = path.share * path.ratio * own / max(dot(PATH_HERO_SHARE, path.ratio * densities), 1e-30);
+	return looks && count < PATH_CHAIN_LENGTH ? weight * lets : vec3(0.0);
+}
+
+// Cloud or not at a place that the search for the sun has come to; collided: by a free path, else by the next forward scattering. Returns false when nothing is left.
+bool path_sun_meets(INOUT(light_path) path, bool inside, bool collided, float largest)
+{
+	bool alive = true;
+	bool expected = path.arc < path.spans.x;
+	if (collided) {
+		vec3 factor = vec3(1.0) - vec3(extinction) * ((inside ? 1.0 : 0.0) - (expected ? 1.0 : 0.0)) / largest;
+		// Where cloud is unexpected hardly anything is left.
+		float most = clamp(max(factor.x, max(factor.y, factor.z)), 0.0, 1.0);
+		alive = path_random(path) < most;
+		path.sun *= factor / max(most, 1e-6);
+	} else {
+		alive = inside;
+		float share = expected ? 1.0 : path.arc < path.spans.y ? PATH_LIKELY : path_sun_unlikely(path.spans);
+		path.sun /= share;
+		path.left = max(path.left - 1, 0);
+		path.direction = path_sun_direction(path, path_sun_texel(path));
+		path_sun_draw_next(path);
+	}
+	return alive;
+}
+#endif

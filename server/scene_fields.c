@@ -54,7 +54,7 @@ const struct scene_field scene_fields[] = {
 	{"radiosity", "max_passes", FIELD_INTEGER, AT(scene.radiosity.max_passes), BETWEEN(0, 1024)},
 
 	{"model", "name", FIELD_CHOICE, AT(scene.model.name), .choices = scene_model_names,
-	 .choices_later = LATER(MODEL_REFERENCE) | LATER(MODEL_VOLUME) | LATER(MODEL_PLANAR)},
+	 .choices_later = LATER(MODEL_VOLUME) | LATER(MODEL_PLANAR)},
 	{"model", "shading", FIELD_CHOICE, AT(scene.model.shading), .choices = scene_shading_names},
 	{"model", "optics", FIELD_CHOICE, AT(scene.model.optics), .choices = scene_optics_names},
 	{"model", "paths", FIELD_CHOICES, AT(scene.model.paths), .choices = scene_path_names},

@@ -2,6 +2,7 @@
 # make test   installs what tests need, builds, runs all tests
 # make demo   four pictures into out/, with their timings
 # make validate   measures the bounds of optics and radiosity and draws the paper's figures into docs/validation/, some minutes
+# make judge   measures the slab against its reference over 24 scenes and writes docs/judge, some 20 minutes; goes on where it was stopped
 # make gallery   draws the pictures of docs/gallery
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
 
@@ -50,7 +51,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel run test demo gallery validate unit http format clean packages test-packages
+.PHONY: all programs kernel run test demo gallery validate judge unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -165,6 +166,12 @@ validate: packages
 	@scripts/packages.sh $(VALIDATE_PACKAGES)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(B)/stratus-validate && $(MAKE) --no-print-directory kernel
 	@scripts/validate.sh $(B)
+
+# Figures are kept in out/judge until that is deleted.
+judge: packages
+	@scripts/packages.sh $(GALLERY_PACKAGES) python3
+	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
+	@scripts/judge.sh $(B)
 
 unit: $(UNIT)
 

@@ -42,6 +42,7 @@ static void print_line(FILE *to, const json_t *region, const json_t *variant)
 	print_share(to, number(figures, "rms"));
 	print_share(to, number(figures, "noise"));
 	print_share(to, number(figures, "noise_corrected_rms"));
+	print_share(to, number(figures, "noise_corrected_rms_standard_error"));
 	print_number(to, number(flip, "mean"));
 	print_number(to, number(flip, "max"));
 	fputc('\n', to);
@@ -66,8 +67,8 @@ bool compare_table_print(FILE *to, const json_t *comparison)
 		return false;
 	fprintf(to, "against %s, %.0f x %.0f\n", truth, number(comparison, "width"), number(comparison, "height"));
 	json_array_foreach(variants, v, variant) print_samples(to, variant);
-	fprintf(to, "%-10s %9s  %-12s %8s %8s %8s %8s %8s %8s %8s\n", "region", "pixels", "variant", "bias %", "+- %", "rms %", "noise %",
-		"less it", "FLIP", "largest");
+	fprintf(to, "%-10s %9s  %-12s %8s %8s %8s %8s %8s %8s %8s %8s\n", "region", "pixels", "variant", "bias %", "+- %", "rms %",
+		"noise %", "less it", "+- %", "FLIP", "largest");
 	json_array_foreach(regions, r, region) json_array_foreach(variants, v, variant) if (strcmp(text(variant, "name"), truth) != 0)
 		print_line(to, region, variant);
 	return true;

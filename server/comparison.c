@@ -156,10 +156,11 @@ static json_t *figures_to_json(const struct comparison_figures *figures, bool is
 	const struct difference *light = &figures->light;
 	if (is_truth)
 		return json_pack("{s:o}", "noise", number(light->noise));
-	return json_pack("{s:o, s:o, s:[o, o, o], s:o, s:o, s:o, s:{s:o, s:o}}", "bias", number(light->bias), "bias_standard_error",
+	return json_pack("{s:o, s:o, s:[o, o, o], s:o, s:o, s:o, s:o, s:{s:o, s:o}}", "bias", number(light->bias), "bias_standard_error",
 			 number(light->bias_standard_error), "channel_bias", number(light->channel_bias[0]), number(light->channel_bias[1]),
 			 number(light->channel_bias[2]), "rms", number(light->rms), "noise", number(light->noise), "noise_corrected_rms",
-			 number(light->noise_corrected_rms), "flip", "mean", number(figures->flip.mean), "max",
+			 number(light->noise_corrected_rms), "noise_corrected_rms_standard_error",
+			 number(light->noise_corrected_rms_standard_error), "flip", "mean", number(figures->flip.mean), "max",
 			 number(figures->flip.largest));
 }
 
@@ -179,7 +180,13 @@ static json_t *variant_to_json(const struct comparison *comparison, int index)
 	json_t *regions = json_object();
 	for (int r = 0; r < query->region_count; r++)
 		json_object_set_new(regions, query->region[r].name, figures_to_json(&comparison->figures[index][r], index == query->truth));
-	return json_pack("{s:s, s:o, s:o}", "name", variant->name, "location", location_of(&variant->input.scene), "regions", regions);
+	json_t *object = json_pack("{s:s, s:o}", "name", variant->name, "location", location_of(&variant->input.scene));
+	if (comparison->frame[index]->samples > 0) {
+		json_object_set_new(object, "samples", json_integer(comparison->frame[index]->samples));
+		json_object_set_new(object, "partial", json_boolean(comparison->frame[index]->partial));
+	}
+	json_object_set_new(object, "regions", regions);
+	return object;
 }
 
 char *comparison_to_json(const struct comparison *comparison)

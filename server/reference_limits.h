@@ -12,7 +12,7 @@ void reference_limits_check(const struct config *config, const struct scene *sce
 bool reference_is_timed(const struct scene *scene);
 
 /* When a picture that may end early is to stop gathering light, so that what there is can be answered by the deadline; the deadline itself
- * for all others. Both on the clock of clock.h, as now_ms. */
-double reference_stop_ms(const struct scene *scene, double now_ms, double deadline_ms);
+ * for all others. Both on the clock of clock.h, as now_ms. after_ms: what else is to be done with the picture. */
+double reference_stop_ms(const struct scene *scene, double now_ms, double deadline_ms, double after_ms);
 
 #endif

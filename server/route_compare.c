@@ -18,6 +18,7 @@
 #include "server/scene_assets.h"
 #include "server/service.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -200,6 +201,14 @@ static bool encode(struct compare_work *work, const struct comparison *compariso
 	return ok;
 }
 
+static bool has_partial(const struct compare_work *work)
+{
+	bool partial = false;
+	for (int i = 0; i < work->query.variant_count; i++)
+		partial |= work->run[i].job.frame.partial;
+	return partial;
+}
+
 static void compare(struct work *base)
 {
 	struct compare_work *work = (struct compare_work *)((char *)base - offsetof(struct compare_work, compare));
@@ -208,6 +217,8 @@ static void compare(struct work *base)
 	for (int i = 0; i < work->query.variant_count; i++)
 		frames[i] = &work->run[i].job.frame;
 	const double start = clock_now_ms();
+	/* What was cut short for the deadline goes out, even if that passes now. */
+	work->ended->deadline_ms = has_partial(work) ? INFINITY : work->deadline_ms;
 	work->ended->outcome = RENDER_OUTCOME_NO_MEMORY; /* unless something else turns up */
 	bool ok = comparison_run(&work->query, frames, work->query.has_masks ? &work->run[MASK_RUN].job.frame : NULL, job_is_over,
 				 work->ended, &comparison);
@@ -285,13 +296,25 @@ static void decode(struct work *base)
 	}
 }
 
+/* What comparing takes on a slow processor, ms for each pixel of each variant. */
+#define COMPARE_PIXEL_MS 2e-3
+
+/* Those that may end early share the time that is left. They are the last, so that all after this one are such, or are not done in time
+ * anyway. */
+static double stop_ms(const struct compare_work *work, const struct scene *scene)
+{
+	const double now = clock_now_ms(), pixels = (double)scene->output.width * scene->output.height;
+	const double stop = reference_stop_ms(scene, now, work->deadline_ms, COMPARE_PIXEL_MS * pixels * work->query.variant_count);
+	return stop < work->deadline_ms ? now + (stop - now) / (work->run_count - work->done) : stop;
+}
+
 /* The next variant. It may be rendered, and more, before this returns. false when too much waits. */
 static bool start_run(struct compare_work *work)
 {
 	struct compare_run *run = &work->run[work->order[work->done]];
 	struct service *service = work->request->service;
 	run->job.scene = run->scene;
-	run->job.deadline_ms = work->deadline_ms;
+	run->job.deadline_ms = stop_ms(work, run->scene);
 	run->job.abandoned = job_is_abandoned;
 	run->job.finished = on_rendered;
 	run->decode.run = decode;

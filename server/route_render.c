@@ -257,7 +257,7 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	struct service *service = request->service;
 	work->job.scene = &work->input.scene;
 	work->deadline_ms = deadline_ms;
-	work->job.deadline_ms = reference_stop_ms(&work->input.scene, clock_now_ms(), deadline_ms);
+	work->job.deadline_ms = reference_stop_ms(&work->input.scene, clock_now_ms(), deadline_ms, 0);
 	work->job.abandoned = is_abandoned;
 	work->job.finished = on_rendered;
 	work->encode.run = encode;

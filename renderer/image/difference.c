@@ -7,8 +7,9 @@ enum { CHANNELS = 3 };
 struct sums {
 	size_t pixels;
 	double truth[CHANNELS], difference[CHANNELS];
-	double square;             /* of differences, all channels */
-	double variance[CHANNELS]; /* of both pictures */
+	double square;                /* of differences, all channels */
+	double variance[CHANNELS];    /* of both pictures */
+	double excess, excess_square; /* over pixels: squared difference beyond the variance, its square */
 };
 
 static double variance_at(const float *error, size_t i)
@@ -18,20 +19,33 @@ static double variance_at(const float *error, size_t i)
 
 static void add_pixel(const struct difference_pair *pair, size_t pixel, struct sums *sums)
 {
+	double excess = 0;
 	sums->pixels++;
 	for (int c = 0; c < CHANNELS; c++) {
 		const size_t i = pixel * CHANNELS + (size_t)c;
 		const double difference = (double)pair->picture[i] - (double)pair->truth[i];
 		sums->truth[c] += (double)pair->truth[i];
 		sums->difference[c] += difference;
+		const double variance = variance_at(pair->picture_error, i) + variance_at(pair->truth_error, i);
 		sums->square += difference * difference;
-		sums->variance[c] += variance_at(pair->picture_error, i) + variance_at(pair->truth_error, i);
+		sums->variance[c] += variance;
+		excess += difference * difference - variance;
 	}
+	sums->excess += excess;
+	sums->excess_square += excess * excess;
 }
 
 static double total(const double values[CHANNELS])
 {
 	return values[0] + values[1] + values[2];
+}
+
+/* Of the noise-corrected RMS, in the picture's unit: that of the mean excess, carried through the root. */
+static double corrected_error(const struct sums *sums, double corrected)
+{
+	const double n = (double)sums->pixels, mean = sums->excess / n;
+	const double error = sqrt(fmax(sums->excess_square / n - mean * mean, 0) / n) / CHANNELS;
+	return total(sums->variance) == 0 ? 0 : corrected * corrected > error ? 0.5 * error / corrected : sqrt(error);
 }
 
 struct difference difference_measure(const struct difference_pair *pair, const uint8_t *mask, uint8_t bits, size_t count)
@@ -50,7 +64,9 @@ struct difference difference_measure(const struct difference_pair *pair, const u
 		result.channel_bias[c] = sums.truth[c] > 0 ? sums.difference[c] / sums.truth[c] : NAN;
 	result.rms = sqrt(sums.square / values) / unit;
 	result.noise = sqrt(total(sums.variance) / values) / unit;
-	result.noise_corrected_rms = sqrt(fmax(sums.square - total(sums.variance), 0) / values) / unit;
+	const double corrected = sqrt(fmax(sums.square - total(sums.variance), 0) / values);
+	result.noise_corrected_rms = corrected / unit;
+	result.noise_corrected_rms_standard_error = corrected_error(&sums, corrected) / unit;
 	return result;
 }
 

@@ -22,6 +22,7 @@ struct difference {
 	double rms;                 /* root of the mean square of picture - truth, relative */
 	double noise;               /* root of the mean square of both standard errors, relative */
 	double noise_corrected_rms; /* root of rms^2 - noise^2; 0 where noise explains all of it */
+	double noise_corrected_rms_standard_error; /* of that, at most: from its scatter over pixels. 0: no noise */
 };
 
 /* Measures the pixels whose mask has a bit of `bits`; count: of pixels. */

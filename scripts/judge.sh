@@ -1,5 +1,5 @@
 #!/bin/bash
-# Measures the slab against its reference into docs/judge and redraws figure 9: judge.sh BUILD_DIR.
+# Measures the slab against its reference into docs/judge and redraws figure 9: judge.sh BUILD_DIR. JUDGE_SAMPLES=N for others than 64 samples.
 set -euo pipefail
 B=${1:-build}
 . scripts/daemon.sh
@@ -20,7 +20,7 @@ export STRATUS_SERVER=$daemon_url
 draw() { # draw NAME: solved, paper and reference side by side, without the maps below them
 	[ -f "out/judge/$1.png" ] && return
 	echo "figure 9, $1"
-	"$B/stratus" compare "tests/judge/figure9-$1.json" --with model.shading=paper --with model.name=reference --and model.samples=64 \
+	"$B/stratus" compare "tests/judge/figure9-$1.json" --with model.shading=paper --with model.name=reference --and model.samples="${JUDGE_SAMPLES:-64}" \
 		--region all --timeout 3600 -q -o "$work/$1.png"
 	convert "$work/$1.png" -crop 100%x33.334%+0+0 +repage "out/judge/$1.png"
 }

@@ -2,9 +2,10 @@
 
 Each scene is rendered solved, in the paper's shading, by the reference, and by the reference once more with another seed and fewer samples, which
 must differ from it by noise alone. The figures of finished scenes are kept in out/judge, so that a run that was stopped goes on; the page is written
-from all of them.
+from all of them. JUDGE_SAMPLES=N takes others than 64 samples, for a quick look.
 """
 import json
+import os
 import pathlib
 import statistics
 import subprocess
@@ -12,8 +13,10 @@ import sys
 import time
 
 SCENES = pathlib.Path(__file__).parent / "scenes"
-KEPT = pathlib.Path("out/judge")
-WIDTH, HEIGHT, SAMPLES, SAMPLES_AGAIN = 160, 120, 64, 16
+WIDTH, HEIGHT = 160, 120
+SAMPLES = int(os.environ.get("JUDGE_SAMPLES", 64))
+SAMPLES_AGAIN = max(2, SAMPLES // 4)
+KEPT = pathlib.Path("out/judge") / str(SAMPLES)
 REGIONS = ("cloud", "sky", "ground")
 BIAS_BOUND, RMS_BOUND = 5, 15  # percent
 # So many pixels make a figure.

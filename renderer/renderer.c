@@ -170,12 +170,20 @@ const struct renderer_info *renderer_info(const struct renderer *renderer)
 
 /* --- one frame -------------------------------------------------------------------------------------------------------------------- */
 
+/* What a reference keeps from one call to the next. */
+struct render_pending {
+	struct reference_work *work;
+	struct stage_timing spent[STAGE_COUNT];
+};
+
 /* Work of one call of renderer_render. */
 struct job {
 	struct renderer *renderer;
 	const struct scene *scene;
-	renderer_cancelled *cancelled;
+	renderer_cancelled *cancelled, *paused;
 	void *cancel_context;
+	struct render_pending **pending;
+	bool unfinished; /* the rest is for another call */
 	struct frame *frame;
 
 	struct ground_maps ground;
@@ -370,10 +378,14 @@ static bool run_reference(struct job *job, const struct view_inputs *view)
 	const struct reference_inputs inputs = {.view = view,
 						.sky_at_layer = sky_from(job, scene->clouds.base_m + scene->clouds.thickness_m),
 						.sky_at_ground = sky_from(job, 0.1)};
-	if (!inputs.sky_at_layer || !inputs.sky_at_ground ||
+	const struct reference_watch watch = {job->cancelled, job->paused, job->cancel_context};
+	struct render_pending *pending = *job->pending;
+	if (!inputs.sky_at_layer || !inputs.sky_at_ground || !pending ||
 	    !reference_stage_run(&job->renderer->reference, &job->renderer->context, scene, &inputs, job->frame->layer,
-				 job->frame->layer_count, job->cancelled, job->cancel_context, job->pictures, &result))
+				 job->frame->layer_count, &watch, &pending->work, job->pictures, &result)) {
+		job->unfinished = pending && pending->work && inputs.sky_at_layer && inputs.sky_at_ground;
 		return false;
+	}
 	job->frame->samples = result.samples;
 	job->frame->partial = result.stopped;
 	if (result.stopped)
@@ -465,12 +477,43 @@ static bool on_processor(enum stage stage)
 	return stage == STAGE_OPTICS || stage == STAGE_READBACK;
 }
 
+/* What went on before, in the same picture. */
+static void add_spent(struct job *job)
+{
+	const struct render_pending *pending = *job->pending;
+	for (int i = 0; pending && i < STAGE_COUNT; i++) {
+		job->frame->timing[i].milliseconds += pending->spent[i].milliseconds;
+		job->frame->timing[i].reused &= pending->spent[i].reused;
+	}
+}
+
+/* Is there a picture already, that is wanted even when it is cancelled? */
+static bool has_samples(const struct job *job)
+{
+	const struct render_pending *pending = *job->pending;
+	return pending && pending->work && job->scene->model.partial && reference_work_samples(pending->work) > 0;
+}
+
+static bool is_cancelled(const struct job *job)
+{
+	return job->cancelled && !has_samples(job) && job->cancelled(job->cancel_context);
+}
+
+static enum render_result result_of_failure(const struct job *job)
+{
+	if (job->unfinished)
+		return RENDER_UNFINISHED;
+	if (job->cancelled && job->cancelled(job->cancel_context))
+		return RENDER_CANCELLED;
+	return gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+}
+
 static enum render_result run_stages(struct job *job)
 {
 	struct renderer *renderer = job->renderer;
 	for (int i = 0; i < STAGE_COUNT; i++) {
 		struct stage_timing *timing = &job->frame->timing[i];
-		if (job->cancelled && job->cancelled(job->cancel_context))
+		if (is_cancelled(job))
 			return RENDER_CANCELLED;
 		if (i == STAGE_READBACK)
 			glFinish();
@@ -482,9 +525,7 @@ static enum render_result run_stages(struct job *job)
 		timing->milliseconds = clock_milliseconds() - begin;
 		timing->reused = renderer->context.reused;
 		if (!ok)
-			return job->cancelled && job->cancelled(job->cancel_context) ? RENDER_CANCELLED
-			       : gl_lost()                                           ? RENDER_FAILED
-										     : RENDER_OUT_OF_MEMORY;
+			return result_of_failure(job);
 		if (gl_failed(stage_names[i]))
 			return gl_failed_for_memory() ? RENDER_OUT_OF_MEMORY : RENDER_FAILED;
 	}
@@ -494,14 +535,47 @@ static enum render_result run_stages(struct job *job)
 	return RENDER_OK;
 }
 
+static void drop_pending(struct render_pending **pending)
+{
+	if (*pending)
+		reference_work_destroy((*pending)->work);
+	free(*pending);
+	*pending = NULL;
+}
+
+/* Keeps what a picture that goes on took so far; frees what another one left. */
+static void settle_pending(struct job *job, enum render_result result)
+{
+	if (result == RENDER_UNFINISHED)
+		memcpy((*job->pending)->spent, job->frame->timing, sizeof job->frame->timing);
+	else
+		drop_pending(job->pending);
+}
+
 enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
 				   struct frame *frame)
 {
+	struct render_pending *pending = NULL;
+	return renderer_render_some(renderer, scene, cancelled, NULL, context, &pending, frame);
+}
+
+enum render_result renderer_render_some(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled,
+					renderer_cancelled *paused, void *context, struct render_pending **pending, struct frame *frame)
+{
 	*frame = (struct frame){0};
-	struct job job = {.renderer = renderer, .scene = scene, .cancelled = cancelled, .cancel_context = context, .frame = frame};
+	struct job job = {.renderer = renderer,
+			  .scene = scene,
+			  .cancelled = cancelled,
+			  .paused = paused,
+			  .cancel_context = context,
+			  .pending = pending,
+			  .frame = frame};
+	if (!*pending && scene->model.name == MODEL_REFERENCE)
+		*pending = calloc(1, sizeof **pending);
 	if (scene->output.width > renderer->info.max_texture_size || scene->output.height > renderer->info.max_texture_size) {
 		log_error("renderer: %d x %d is more than this device's %d", scene->output.width, scene->output.height,
 			  renderer->info.max_texture_size);
+		drop_pending(pending);
 		return RENDER_OUT_OF_MEMORY;
 	}
 	cache_begin_frame(renderer->context.cache);
@@ -514,6 +588,8 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	renderer->context.block.cloud_layer[3] = scene->clouds.type != CLOUD_NONE && scene->clouds.thickness_m > 0;
 
 	const enum render_result result = run_stages(&job);
+	add_spent(&job);
+	settle_pending(&job, result);
 	frame->radiosity_passes = job.light.passes;
 	frame->radiosity_residual = job.light.residual;
 	memcpy(frame->radiosity_residuals, job.light.residuals, sizeof frame->radiosity_residuals);

@@ -15,22 +15,10 @@ const char *const scene_tone_names[] = {"filmic", "linear", NULL};
 const char *const scene_png_compression_names[] = {"fast", "small", NULL};
 const char *const scene_exr_compression_names[] = {"none", "rle", "zip", "piz", "dwaa", NULL};
 const char *const scene_exr_type_names[] = {"auto", "half", "float", NULL};
-const char *const scene_layer_names[] = {"color",
-					 "sun_direct",
-					 "order0",
-					 "order1",
-					 "order2",
-					 "multiple",
-					 "cloud_sky",
-					 "cloud_ground",
-					 "sky",
-					 "ground",
-					 "air",
-					 "transmittance",
-					 "optical_thickness",
-					 "distance",
-					 "standard_error",
-					 NULL};
+const char *const scene_layer_names[] = {
+	"color",          "sun_direct", "order0", "order1", "order2",        "multiple",          "cloud_sky",
+	"cloud_ground",   "sky",        "ground", "air",    "transmittance", "optical_thickness", "distance",
+	"standard_error", NULL};
 
 const char *const scene_path_names[] = {"sun_direct",   "order0", "order1", "order2", "multiple", "cloud_sky",
 					"cloud_ground", "sky",    "ground", "air",    NULL};

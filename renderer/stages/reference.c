@@ -24,8 +24,8 @@ static const double tops_texel_m = 10;
 /* A call of OpenGL is to last about so long, ms: one that is to stop waits for its end. */
 static const double call_ms = 40;
 
-/* All that one picture needs; finished with it. */
-struct work {
+/* All that one picture needs. Between two calls: what it was made of is the same then, looked up again. */
+struct reference_work {
 	struct texture tops, bounds, inverse, chains;
 	struct texture sum, squares, slots[GROUPS][GROUP];
 	enum layer slot_layer[GROUPS][GROUP];
@@ -33,6 +33,11 @@ struct work {
 	struct path_chains *drawn;
 	enum view_side side;
 	double rows; /* of a call */
+
+	int samples;      /* rounds that are done */
+	int view, row;    /* of the round in work: views that are done, rows of the next one */
+	int chains_first; /* the round that chains were drawn for; -1: none */
+	double spent_ms;
 };
 
 void reference_stage_init(struct reference_stage *stage, const struct pass_compiler *compiler)
@@ -58,8 +63,10 @@ void reference_stage_finish(struct reference_stage *stage)
 	*stage = (struct reference_stage){0};
 }
 
-static void work_finish(struct work *work)
+void reference_work_destroy(struct reference_work *work)
 {
+	if (!work)
+		return;
 	texture_finish(&work->tops);
 	texture_finish(&work->bounds);
 	texture_finish(&work->inverse);
@@ -69,21 +76,28 @@ static void work_finish(struct work *work)
 	for (int i = 0; i < GROUPS * GROUP; i++)
 		texture_finish(&work->slots[i / GROUP][i % GROUP]);
 	free(work->drawn);
+	free(work);
+}
+
+int reference_work_samples(const struct reference_work *work)
+{
+	return work->samples;
 }
 
 /* --- programs ------------------------------------------------------------------------------------------------------------------- */
 
-static const struct pass *paths_pass(struct reference_stage *stage, enum view_side side, bool layers, enum projection projection, bool large)
+static const struct pass *paths_pass(struct reference_stage *stage, enum view_side side, bool layers, enum projection projection,
+				     bool large)
 {
 	struct pass **pass = &stage->paths[side][layers][projection][large];
 	char defines[160];
-	const struct pass_desc desc = {
-		.file = "shaders/passes/reference.glsl",
-		.defines = defines,
-		.outputs = layers ? 2 + GROUP : 2,
-		.samplers = {"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "phase_table",
-			     "path_tops", "path_bounds", "phase_inverse", "forward_chains", "sky_at_layer", "sky_at_ground"},
-		.adds = true};
+	const struct pass_desc desc = {.file = "shaders/passes/reference.glsl",
+				       .defines = defines,
+				       .outputs = layers ? 2 + GROUP : 2,
+				       .samplers = {"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end",
+						    "ground_map", "phase_table", "path_tops", "path_bounds", "phase_inverse",
+						    "forward_chains", "sky_at_layer", "sky_at_ground"},
+				       .adds = true};
 	snprintf(defines, sizeof defines,
 		 "#define REFERENCE_ABOVE %d\n#define REFERENCE_LAYERS %d\n#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n",
 		 side == VIEW_ABOVE, layers, projection, large);
@@ -125,7 +139,8 @@ static int tops_side(const struct scene *scene, enum view_side side)
 	return texels;
 }
 
-/* The largest height in squares of the tile, and then in those and their eight neighbours, so that it holds for as far as a square reaches. */
+/* The largest height in squares of the tile, and then in those and their eight neighbours, so that it holds for as far as a square reaches.
+ */
 static void find_bounds(const float *tops, int side, float bounds[BOUNDS_SIDE][BOUNDS_SIDE])
 {
 	static _Thread_local float own[BOUNDS_SIDE][BOUNDS_SIDE];
@@ -138,12 +153,13 @@ static void find_bounds(const float *tops, int side, float bounds[BOUNDS_SIDE][B
 		for (int x = 0; x < BOUNDS_SIDE; x++) {
 			bounds[y][x] = 0;
 			for (int k = 0; k < 9; k++)
-				bounds[y][x] = fmaxf(bounds[y][x], own[(y + k / 3 + BOUNDS_SIDE - 1) % BOUNDS_SIDE]
-								      [(x + k % 3 + BOUNDS_SIDE - 1) % BOUNDS_SIDE]);
+				bounds[y][x] = fmaxf(
+					bounds[y][x],
+					own[(y + k / 3 + BOUNDS_SIDE - 1) % BOUNDS_SIDE][(x + k % 3 + BOUNDS_SIDE - 1) % BOUNDS_SIDE]);
 		}
 }
 
-static bool make_tops(struct reference_stage *stage, const struct scene *scene, const struct view_inputs *view, struct work *work)
+static bool make_tops(struct reference_stage *stage, const struct scene *scene, const struct view_inputs *view, struct reference_work *work)
 {
 	const struct field_maps *field = view->field;
 	const struct pass *pass = tops_pass(stage, work->side);
@@ -166,7 +182,7 @@ static bool make_tops(struct reference_stage *stage, const struct scene *scene, 
 	return ok;
 }
 
-static bool make_droplets(const struct view_inputs *view, struct work *work)
+static bool make_droplets(const struct view_inputs *view, struct reference_work *work)
 {
 	struct path_inverse *inverse = malloc(sizeof *inverse);
 	work->drawn = malloc(sizeof *work->drawn);
@@ -190,7 +206,7 @@ static bool sums_init(struct texture *sums, const struct scene *scene)
 	return true;
 }
 
-static bool make_sums(const struct scene *scene, const enum layer *layers, int count, struct work *work)
+static bool make_sums(const struct scene *scene, const enum layer *layers, int count, struct reference_work *work)
 {
 	bool ok = sums_init(&work->sum, scene) && sums_init(&work->squares, scene);
 	for (int i = 0; ok && i < count; i++) {
@@ -210,9 +226,13 @@ static bool make_sums(const struct scene *scene, const enum layer *layers, int c
 struct round {
 	int first, samples;
 	double deadline; /* ms of clock_milliseconds; 0: none */
-	renderer_cancelled *cancelled;
-	void *cancel_context;
+	const struct reference_watch *watch;
 };
+
+static bool asks(renderer_cancelled *question, void *context)
+{
+	return question && question(context);
+}
 
 /* The first rounds are short, so that there soon is a picture. */
 static int round_samples(int first, int samples)
@@ -221,7 +241,8 @@ static int round_samples(int first, int samples)
 	return wanted < samples - first ? wanted : samples - first;
 }
 
-static struct pass_run run_of(const struct scene *scene, const struct reference_inputs *inputs, const struct work *work, const struct round *round)
+static struct pass_run run_of(const struct scene *scene, const struct reference_inputs *inputs, const struct reference_work *work,
+			      const struct round *round)
 {
 	const struct view_inputs *view = inputs->view;
 	return (struct pass_run){.width = scene->output.width,
@@ -235,7 +256,8 @@ static struct pass_run run_of(const struct scene *scene, const struct reference_
 }
 
 /* Some rows, of all groups. false when a program does not compile. */
-static bool run_rows(struct reference_stage *stage, const struct camera_view *view, bool large, struct work *work, struct pass_run *run)
+static bool run_rows(struct reference_stage *stage, const struct camera_view *view, bool large, struct reference_work *work,
+		     struct pass_run *run)
 {
 	for (int group = 0; group < work->group_count; group++) {
 		const bool slots = work->slot_count > 0;
@@ -255,28 +277,30 @@ static bool run_rows(struct reference_stage *stage, const struct camera_view *vi
 	return true;
 }
 
-enum outcome { OUTCOME_DONE, OUTCOME_STOPPED, OUTCOME_TIME_OVER, OUTCOME_FAILED };
+enum outcome { OUTCOME_DONE, OUTCOME_PAUSED, OUTCOME_STOPPED, OUTCOME_TIME_OVER, OUTCOME_FAILED };
 
-/* The rows of one view, a few at a time. */
+/* The rows of one view, a few at a time, from where an earlier call left off. */
 static enum outcome run_view_rows(struct reference_stage *stage, const struct camera_view *view, bool large, const struct round *round,
-				  struct work *work, struct pass_run *run)
+				  struct reference_work *work, struct pass_run *run)
 {
-	const int end = view->first_row + view->height;
-	for (int row = view->first_row; row < end;) {
+	while (work->row < view->height) {
 		const double begin = clock_milliseconds();
-		if (round->cancelled && round->cancelled(round->cancel_context))
+		if (asks(round->watch->cancelled, round->watch->context))
 			return OUTCOME_STOPPED;
 		if (round->deadline > 0 && begin > round->deadline && round->first > 0)
 			return OUTCOME_TIME_OVER;
-		run->first_row = row;
-		run->height = (int)fmin(fmax(work->rows, 1), end - row);
+		run->first_row = view->first_row + work->row;
+		run->height = (int)fmin(fmax(work->rows, 1), view->height - work->row);
 		if (!run_rows(stage, view, large, work, run))
 			return OUTCOME_FAILED;
-		row += run->height;
+		work->row += run->height;
 		/* What a call takes now, the next one will take per sample and row. */
 		const double took = clock_milliseconds() - begin;
 		work->rows = run->height * fmin(fmax(call_ms / fmax(took, 0.01), 0.25), 4);
+		if (asks(round->watch->paused, round->watch->context))
+			return OUTCOME_PAUSED;
 	}
+	work->row = 0;
 	return OUTCOME_DONE;
 }
 
@@ -290,43 +314,48 @@ static void set_view(struct reference_stage *stage, struct stage_context *contex
 }
 
 static enum outcome run_round(struct reference_stage *stage, struct stage_context *context, const struct scene *scene,
-			      const struct reference_inputs *inputs, const struct round *round, struct work *work)
+			      const struct reference_inputs *inputs, const struct round *round, struct reference_work *work)
 {
 	struct pass_run run = run_of(scene, inputs, work, round);
 	enum outcome outcome = OUTCOME_DONE;
-	path_chains_draw(work->drawn, inputs->view->droplets->tables, context->block.sun_direction[3], scene->model.seed,
-			 (uint64_t)round->first);
-	texture_upload(&work->chains, &work->drawn->chain[0][0][0][0][0]);
-	for (int i = 0; outcome == OUTCOME_DONE && i < camera_view_count(scene); i++) {
-		const struct camera_view view = camera_view_of(scene, i);
-		set_view(stage, context, scene, i);
-		outcome = run_view_rows(stage, &view, stage->disc.views[i].large, round, work, &run);
+	if (work->chains_first != round->first) {
+		path_chains_draw(work->drawn, inputs->view->droplets->tables, context->block.sun_direction[3], scene->model.seed,
+				 (uint64_t)round->first);
+		texture_upload(&work->chains, &work->drawn->chain[0][0][0][0][0]);
+		work->chains_first = round->first;
 	}
+	for (; work->view < camera_view_count(scene); work->view++) {
+		const struct camera_view view = camera_view_of(scene, work->view);
+		set_view(stage, context, scene, work->view);
+		outcome = run_view_rows(stage, &view, stage->disc.views[work->view].large, round, work, &run);
+		if (outcome != OUTCOME_DONE)
+			return outcome;
+	}
+	work->view = 0;
 	work->rows *= (double)round->samples / fmax(1, round_samples(round->first + round->samples, scene->model.samples));
 	return outcome;
 }
 
 static enum outcome run_rounds(struct reference_stage *stage, struct stage_context *context, const struct scene *scene,
-			       const struct reference_inputs *inputs, renderer_cancelled *cancelled, void *cancel_context, struct work *work,
-			       int *samples)
+			       const struct reference_inputs *inputs, const struct reference_watch *watch, struct reference_work *work)
 {
 	const double begin = clock_milliseconds(), budget = scene->model.time_budget_ms;
-	struct round round = {.deadline = budget > 0 ? begin + budget : 0, .cancelled = cancelled, .cancel_context = cancel_context};
+	struct round round = {.deadline = budget > 0 ? begin + budget - work->spent_ms : 0, .watch = watch};
 	enum outcome outcome = OUTCOME_DONE;
-	work->rows = 1;
-	for (*samples = 0; outcome == OUTCOME_DONE && *samples < scene->model.samples;) {
-		round.first = *samples;
+	while (outcome == OUTCOME_DONE && work->samples < scene->model.samples) {
+		round.first = work->samples;
 		round.samples = round_samples(round.first, scene->model.samples);
 		outcome = run_round(stage, context, scene, inputs, &round, work);
 		if (outcome == OUTCOME_DONE)
-			*samples += round.samples;
+			work->samples += round.samples;
 	}
+	work->spent_ms += clock_milliseconds() - begin;
 	return outcome;
 }
 
 /* --- the picture ------------------------------------------------------------------------------------------------------------------ */
 
-static const struct texture *sums_of(const struct work *work, enum layer layer)
+static const struct texture *sums_of(const struct reference_work *work, enum layer layer)
 {
 	for (int i = 0; i < work->slot_count; i++)
 		if (work->slot_layer[i / GROUP][i % GROUP] == layer)
@@ -334,8 +363,8 @@ static const struct texture *sums_of(const struct work *work, enum layer layer)
 	return &work->sum;
 }
 
-static bool resolve(struct reference_stage *stage, const struct scene *scene, const enum layer *layers, int count, const struct work *work,
-		    const struct texture **pictures)
+static bool resolve(struct reference_stage *stage, const struct scene *scene, const enum layer *layers, int count,
+		    const struct reference_work *work, const struct texture **pictures)
 {
 	const struct pass *pass = resolve_pass(stage);
 	for (int i = 0; pass && i < count; i++) {
@@ -356,22 +385,42 @@ static double horizon_sine(double height)
 	return -sqrt(height * (2 * radius + height)) / (radius + height);
 }
 
-bool reference_stage_run(struct reference_stage *stage, struct stage_context *context, const struct scene *scene,
-			 const struct reference_inputs *inputs, const enum layer *layers, int count, renderer_cancelled *cancelled,
-			 void *cancel_context, const struct texture **pictures, struct reference_result *result)
+static struct reference_work *begin_work(struct reference_stage *stage, const struct scene *scene, const struct reference_inputs *inputs,
+					 const enum layer *layers, int count)
 {
-	struct work work = {.side = scene->camera.position_m[2] < scene->clouds.base_m ? VIEW_BELOW : VIEW_ABOVE};
+	struct reference_work *work = calloc(1, sizeof *work);
+	if (!work)
+		return NULL;
+	work->side = scene->camera.position_m[2] < scene->clouds.base_m ? VIEW_BELOW : VIEW_ABOVE;
+	work->rows = 1;
+	work->chains_first = -1;
+	if (make_tops(stage, scene, inputs->view, work) && make_droplets(inputs->view, work) && make_sums(scene, layers, count, work))
+		return work;
+	reference_work_destroy(work);
+	return NULL;
+}
+
+bool reference_stage_run(struct reference_stage *stage, struct stage_context *context, const struct scene *scene,
+			 const struct reference_inputs *inputs, const enum layer *layers, int count, const struct reference_watch *watch,
+			 struct reference_work **work, const struct texture **pictures, struct reference_result *result)
+{
 	enum outcome outcome = OUTCOME_FAILED;
 	*result = (struct reference_result){0};
 	context->reused = false;
 	drop_layers(stage);
-	if (disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(scene->camera.position_m[2]), inputs->view->sun_cover) &&
-	    make_tops(stage, scene, inputs->view, &work) && make_droplets(inputs->view, &work) && make_sums(scene, layers, count, &work))
-		outcome = run_rounds(stage, context, scene, inputs, cancelled, cancel_context, &work, &result->samples);
+	if (!*work)
+		*work = begin_work(stage, scene, inputs, layers, count);
+	if (*work &&
+	    disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(scene->camera.position_m[2]), inputs->view->sun_cover))
+		outcome = run_rounds(stage, context, scene, inputs, watch, *work);
+	if (outcome == OUTCOME_PAUSED)
+		return false;
+	result->samples = *work ? (*work)->samples : 0;
 	result->stopped = outcome == OUTCOME_STOPPED;
 	bool ok = outcome == OUTCOME_DONE || outcome == OUTCOME_TIME_OVER ||
 		  (outcome == OUTCOME_STOPPED && scene->model.partial && result->samples > 0);
-	ok = ok && resolve(stage, scene, layers, count, &work, pictures);
-	work_finish(&work);
+	ok = ok && resolve(stage, scene, layers, count, *work, pictures);
+	reference_work_destroy(*work);
+	*work = NULL;
 	return ok;
 }

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE = 8, BASE_M = 1000 };
+enum { SIDE = 8, BASE_M = 1000, BOUNDS_SIDE = 64 };
 
 static void set_texture(struct twin *twin, enum twin_sampler sampler, const float *texels, int width, int height, bool repeat, bool nearest)
 {
@@ -40,7 +40,7 @@ static void fill_textures(struct uniform_layer *layer)
 	set_texture(twin, TWIN_SKY_AT_GROUND, layer->sky, 1, 1, true, true);
 	set_texture(twin, TWIN_GROUND, layer->ground, 1, 1, true, true);
 	set_texture(twin, TWIN_TOPS, layer->top, 1, 1, true, true);
-	set_texture(twin, TWIN_BOUNDS, layer->top, 1, 1, true, true);
+	set_texture(twin, TWIN_BOUNDS, layer->bounds, BOUNDS_SIDE, BOUNDS_SIDE, true, true);
 	set_texture(twin, TWIN_PHASE, layer->phase, DROPLET_PHASE_COLUMNS, 2, false, false);
 	set_texture(twin, TWIN_INVERSE, &layer->inverse->unit[0][0], PATH_INVERSE_COLUMNS, 1, false, false);
 	set_texture(twin, TWIN_CHAINS, &layer->chains->chain[0][0][0][0][0], PATH_CHAINS_A_ROW * PATH_CHAIN_LENGTH, BAND_COUNT * PATH_CHAIN_ROWS,
@@ -79,7 +79,10 @@ void layer_init(struct uniform_layer *layer, const struct layer_case *is)
 	layer->inverse = malloc(sizeof *layer->inverse);
 	layer->chains = malloc(sizeof *layer->chains);
 	layer->phase = calloc((size_t)2 * DROPLET_PHASE_COLUMNS * 4, sizeof *layer->phase);
-	assert(layer->inverse && layer->chains && layer->phase);
+	layer->bounds = malloc(sizeof(float[BOUNDS_SIDE][BOUNDS_SIDE][4]));
+	assert(layer->inverse && layer->chains && layer->phase && layer->bounds);
+	for (int i = 0; i < BOUNDS_SIDE * BOUNDS_SIDE; i++)
+		fill4(layer->bounds + 4 * i, is->thickness_m);
 	for (int row = 0; row < 2; row++)
 		for (int i = 0; i < DROPLET_PHASE_COLUMNS; i++)
 			for (int band = 0; band < 3; band++)
@@ -95,6 +98,7 @@ void layer_init(struct uniform_layer *layer, const struct layer_case *is)
 
 void layer_finish(struct uniform_layer *layer)
 {
+	free(layer->bounds);
 	free(layer->phase);
 	free(layer->chains);
 	free(layer->inverse);

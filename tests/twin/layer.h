@@ -18,7 +18,7 @@ struct uniform_layer {
 	struct twin twin;
 	struct path_inverse *inverse;
 	struct path_chains *chains;
-	float *phase, top[4], black[4], white[4], sky[4], ground[4], identity[4];
+	float *phase, *bounds, top[4], black[4], white[4], sky[4], ground[4], identity[4];
 	struct layer_case is;
 };
 

@@ -26,7 +26,6 @@ static const double call_ms = 40;
 
 /* All that one picture needs; finished with it. */
 struct work {
-	struct texture tops, bounds, inverse, chains;
 	struct texture sum, squares, slots[GROUPS][GROUP];
 	enum layer slot_layer[GROUPS][GROUP];
 	int slot_count, group_count;
@@ -40,8 +39,12 @@ void reference_stage_init(struct reference_stage *stage, const struct pass_compi
 	*stage = (struct reference_stage){.compiler = *compiler};
 }
 
-static void drop_layers(struct reference_stage *stage)
+static void drop_last(struct reference_stage *stage)
 {
+	texture_finish(&stage->tables.tops);
+	texture_finish(&stage->tables.bounds);
+	texture_finish(&stage->tables.inverse);
+	texture_finish(&stage->tables.chains);
 	for (int i = 0; i < LAYER_COUNT; i++)
 		texture_finish(&stage->layers[i]);
 }
@@ -54,16 +57,12 @@ void reference_stage_finish(struct reference_stage *stage)
 	stage_destroy_passes(stage->tops, VIEW_SIDES);
 	pass_destroy(stage->resolve);
 	disc_buffer_finish(&stage->disc);
-	drop_layers(stage);
+	drop_last(stage);
 	*stage = (struct reference_stage){0};
 }
 
 static void work_finish(struct work *work)
 {
-	texture_finish(&work->tops);
-	texture_finish(&work->bounds);
-	texture_finish(&work->inverse);
-	texture_finish(&work->chains);
 	texture_finish(&work->sum);
 	texture_finish(&work->squares);
 	for (int i = 0; i < GROUPS * GROUP; i++)
@@ -143,39 +142,41 @@ static void find_bounds(const float *tops, int side, float bounds[BOUNDS_SIDE][B
 		}
 }
 
-static bool make_tops(struct reference_stage *stage, const struct scene *scene, const struct view_inputs *view, struct work *work)
+static bool make_tops(struct reference_stage *stage, const struct scene *scene, const struct view_inputs *view, const struct work *work)
 {
+	struct reference_tables *tables = &stage->tables;
 	const struct field_maps *field = view->field;
 	const struct pass *pass = tops_pass(stage, work->side);
 	const int side = tops_side(scene, work->side);
 	float(*bounds)[BOUNDS_SIDE] = malloc(sizeof(float[BOUNDS_SIDE][BOUNDS_SIDE]));
 	float *values = malloc((size_t)side * (size_t)side * sizeof *values);
-	const bool ok = pass && bounds && values && texture_init(&work->tops, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
-			texture_init(&work->bounds, BOUNDS_SIDE, BOUNDS_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_NEAREST);
+	const bool ok = pass && bounds && values && texture_init(&tables->tops, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
+			texture_init(&tables->bounds, BOUNDS_SIDE, BOUNDS_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_NEAREST);
 	if (ok) {
 		const bool above = work->side == VIEW_ABOVE;
-		pass_run(pass, &(struct pass_run){.targets = (struct texture *[]){&work->tops},
+		pass_run(pass, &(struct pass_run){.targets = (struct texture *[]){&tables->tops},
 						  .samplers = {above ? field->height : field->coarse, above ? NULL : field->detail},
 						  .arguments = {{(float)side}}});
-		stage_read_texture(&work->tops, 0, 1, values);
+		stage_read_texture(&tables->tops, 0, 1, values);
 		find_bounds(values, side, bounds);
-		texture_upload(&work->bounds, &bounds[0][0]);
+		texture_upload(&tables->bounds, &bounds[0][0]);
 	}
 	free(values);
 	free(bounds);
 	return ok;
 }
 
-static bool make_droplets(const struct view_inputs *view, struct work *work)
+static bool make_droplets(struct reference_stage *stage, const struct view_inputs *view, struct work *work)
 {
+	struct reference_tables *tables = &stage->tables;
 	struct path_inverse *inverse = malloc(sizeof *inverse);
 	work->drawn = malloc(sizeof *work->drawn);
-	const bool ok = inverse && work->drawn && texture_init(&work->inverse, PATH_INVERSE_COLUMNS, 1, TEXTURE_RGBA32F, 0) &&
-			texture_init(&work->chains, PATH_CHAINS_A_ROW * PATH_CHAIN_LENGTH, BAND_COUNT * PATH_CHAIN_ROWS, TEXTURE_RGBA32F,
+	const bool ok = inverse && work->drawn && texture_init(&tables->inverse, PATH_INVERSE_COLUMNS, 1, TEXTURE_RGBA32F, 0) &&
+			texture_init(&tables->chains, PATH_CHAINS_A_ROW * PATH_CHAIN_LENGTH, BAND_COUNT * PATH_CHAIN_ROWS, TEXTURE_RGBA32F,
 				     TEXTURE_NEAREST);
 	if (ok) {
 		path_inverse_fill(inverse, view->droplets->tables);
-		texture_upload(&work->inverse, &inverse->unit[0][0]);
+		texture_upload(&tables->inverse, &inverse->unit[0][0]);
 	}
 	free(inverse);
 	return ok;
@@ -221,13 +222,14 @@ static int round_samples(int first, int samples)
 	return wanted < samples - first ? wanted : samples - first;
 }
 
-static struct pass_run run_of(const struct scene *scene, const struct reference_inputs *inputs, const struct work *work, const struct round *round)
+static struct pass_run run_of(const struct reference_tables *tables, const struct scene *scene, const struct reference_inputs *inputs,
+			      const struct round *round)
 {
 	const struct view_inputs *view = inputs->view;
 	return (struct pass_run){.width = scene->output.width,
 				 .samplers = {view->sky->transmittance, view->sky->total, view->sky->near, view->sky->to_layer,
-					      view->sky->to_end, view->ground->map, &view->droplets->phase, &work->tops, &work->bounds,
-					      &work->inverse, &work->chains, inputs->sky_at_layer, inputs->sky_at_ground},
+					      view->sky->to_end, view->ground->map, &view->droplets->phase, &tables->tops, &tables->bounds,
+					      &tables->inverse, &tables->chains, inputs->sky_at_layer, inputs->sky_at_ground},
 				 .arguments = {{(float)round->first, (float)round->samples, (float)(scene->model.seed & 0xffff),
 						(float)(scene->model.seed >> 16)},
 					       {0},
@@ -292,11 +294,11 @@ static void set_view(struct reference_stage *stage, struct stage_context *contex
 static enum outcome run_round(struct reference_stage *stage, struct stage_context *context, const struct scene *scene,
 			      const struct reference_inputs *inputs, const struct round *round, struct work *work)
 {
-	struct pass_run run = run_of(scene, inputs, work, round);
+	struct pass_run run = run_of(&stage->tables, scene, inputs, round);
 	enum outcome outcome = OUTCOME_DONE;
 	path_chains_draw(work->drawn, inputs->view->droplets->tables, context->block.sun_direction[3], scene->model.seed,
 			 (uint64_t)round->first);
-	texture_upload(&work->chains, &work->drawn->chain[0][0][0][0][0]);
+	texture_upload(&stage->tables.chains, &work->drawn->chain[0][0][0][0][0]);
 	for (int i = 0; outcome == OUTCOME_DONE && i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
 		set_view(stage, context, scene, i);
@@ -364,9 +366,9 @@ bool reference_stage_run(struct reference_stage *stage, struct stage_context *co
 	enum outcome outcome = OUTCOME_FAILED;
 	*result = (struct reference_result){0};
 	context->reused = false;
-	drop_layers(stage);
+	drop_last(stage);
 	if (disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(scene->camera.position_m[2]), inputs->view->sun_cover) &&
-	    make_tops(stage, scene, inputs->view, &work) && make_droplets(inputs->view, &work) && make_sums(scene, layers, count, &work))
+	    make_tops(stage, scene, inputs->view, &work) && make_droplets(stage, inputs->view, &work) && make_sums(scene, layers, count, &work))
 		outcome = run_rounds(stage, context, scene, inputs, cancelled, cancel_context, &work, &result->samples);
 	result->stopped = outcome == OUTCOME_STOPPED;
 	bool ok = outcome == OUTCOME_DONE || outcome == OUTCOME_TIME_OVER ||

@@ -154,7 +154,7 @@ void reference_resume(INOUT(light_path) path)
 }
 
 // A scattering in cloud.
-void reference_scatter(INOUT(light_path) path, INOUT(reference_sums) sums)
+void reference_scatter(INOUT(light_path) path)
 {
 	path.ratio *= vec3(extinction) / path_of_hero(vec3(extinction), path.hero);
 	vec3 before = path.direction;
@@ -327,7 +327,7 @@ void pass(ivec2 pixel)
 			}
 			// The first is left to the end of this, for all that comes with it.
 			if (path.mode == PATH_SCATTERS && !path.first)
-				reference_scatter(path, sums);
+				reference_scatter(path);
 		}
 		if (path.mode == PATH_SCATTERS && path.first)
 			reference_meet_cloud(path, sums);

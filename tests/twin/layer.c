@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE = 8, BASE_M = 1000, BOUNDS_SIDE = 64 };
+enum { SIDE = 8, BASE_M = 1000, BOUNDS_SIDE = 64, ROUNDS = 4 };
 
 static void set_texture(struct twin *twin, enum twin_sampler sampler, const float *texels, int width, int height, bool repeat, bool nearest)
 {
@@ -27,7 +27,7 @@ static void fill_textures(struct uniform_layer *layer)
 	const struct layer_case *is = &layer->is;
 	fill4(layer->top, is->thickness_m);
 	fill4(layer->white, 1);
-	fill4(layer->sky, is->sky);
+	fill4(layer->sky[0], is->sky); /* over the horizon; below it there is no air */
 	fill4(layer->ground, is->ground_albedo);
 	layer->identity[0] = layer->identity[1] = layer->identity[2] = 1;
 	for (int sampler = 0; sampler < TWIN_SAMPLER_COUNT; sampler++)
@@ -35,9 +35,9 @@ static void fill_textures(struct uniform_layer *layer)
 	set_texture(twin, TWIN_TRANSMITTANCE, layer->identity, 1, 1, true, true);
 	set_texture(twin, TWIN_AIR_TO_LAYER, layer->white, 1, 1, true, true);
 	set_texture(twin, TWIN_AIR_TO_END, layer->white, 1, 1, true, true);
-	set_texture(twin, TWIN_SKY_TOTAL, layer->sky, 1, 1, true, true);
-	set_texture(twin, TWIN_SKY_AT_LAYER, layer->sky, 1, 1, true, true);
-	set_texture(twin, TWIN_SKY_AT_GROUND, layer->sky, 1, 1, true, true);
+	set_texture(twin, TWIN_SKY_TOTAL, layer->sky[0], 1, 2, false, true);
+	set_texture(twin, TWIN_SKY_AT_LAYER, layer->sky[0], 1, 1, true, true);
+	set_texture(twin, TWIN_SKY_AT_GROUND, layer->sky[0], 1, 1, true, true);
 	set_texture(twin, TWIN_GROUND, layer->ground, 1, 1, true, true);
 	set_texture(twin, TWIN_TOPS, layer->top, 1, 1, true, true);
 	set_texture(twin, TWIN_BOUNDS, layer->bounds, BOUNDS_SIDE, BOUNDS_SIDE, true, true);
@@ -88,7 +88,6 @@ void layer_init(struct uniform_layer *layer, const struct layer_case *is)
 			for (int band = 0; band < 3; band++)
 				layer->phase[4 * (row * DROPLET_PHASE_COLUMNS + i) + band] = is->tables->phase[row][i][band];
 	path_inverse_fill(layer->inverse, is->tables);
-	path_chains_draw(layer->chains, is->tables, 0.00465, 1, 0);
 	fill_textures(layer);
 	fill_block(layer);
 	layer->twin.paths = SCENE_PATHS_ALL;
@@ -133,9 +132,13 @@ struct layer_seen layer_see(struct uniform_layer *layer, bool above, double mu_v
 	memset(color, 0, sizeof color);
 	memset(squares, 0, sizeof squares);
 	look(layer, above, mu_v, azimuth);
-	const int each = (samples + SIDE * SIDE - 1) / (SIDE * SIDE);
-	const double count = (double)each * SIDE * SIDE;
-	twin_run(&layer->twin, SIDE, SIDE, 0, each, threads, outputs);
+	const int each = (samples + ROUNDS * SIDE * SIDE - 1) / (ROUNDS * SIDE * SIDE);
+	const double count = (double)each * ROUNDS * SIDE * SIDE;
+	for (int round = 0; round < ROUNDS; round++) {
+		path_chains_draw(layer->chains, layer->is.tables, layer->twin.block.sun_direction[3], 1, (uint64_t)(layer->rounds++));
+		twin_run(&layer->twin, SIDE, SIDE, round * each, each, threads, outputs);
+	}
+	layer->twin.seed++;
 	for (int band = 0; band < 3; band++) {
 		double sum = 0, square = 0;
 		for (int i = 0; i < SIDE * SIDE; i++) {

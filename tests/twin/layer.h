@@ -1,4 +1,4 @@
-/* A uniform layer for the twin: flat tops, light of one kind, nothing between. Asserts are cmocka's or the C library's. */
+/* A uniform layer for the twin: a flat top, and light of one kind. */
 #ifndef STRATUS_TESTS_TWIN_LAYER_H
 #define STRATUS_TESTS_TWIN_LAYER_H
 
@@ -18,8 +18,9 @@ struct uniform_layer {
 	struct twin twin;
 	struct path_inverse *inverse;
 	struct path_chains *chains;
-	float *phase, *bounds, top[4], black[4], white[4], sky[4], ground[4], identity[4];
+	float *phase, *bounds, top[4], black[4], white[4], sky[2][4], ground[4], identity[4];
 	struct layer_case is;
+	int rounds; /* run so far, each with chains of its own */
 };
 
 void layer_init(struct uniform_layer *layer, const struct layer_case *is);

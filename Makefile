@@ -84,8 +84,14 @@ $(B)/render-bench: $(call obj,renderer/programs/bench.c) $(B)/librenderer.a
 $(B)/stratus-image.so: $(call obj,renderer/image/oiio.cpp) $(B)/pic/renderer/scene.c.o
 	$(CXX) $(LDFLAGS) -shared $^ -o $@ $(call pkg,--libs,OpenImageIO zlib)
 
-$(B)/stratus-validate: $(call obj,$(VALIDATE_SRC)) $(B)/librenderer.a
-	$(CC) $(LDFLAGS) $^ -o $@ $(call pkg,--libs,jansson) $(RENDERER_LIBS)
+# The reference model on the processor: the shader as C++, for tests and validation.
+TWIN_OBJ := $(call obj,tests/twin/layer.c tests/twin/twin.cpp)
+$(B)/tests/twin/twin.cpp.o: tests/twin/twin.cpp $(SHADERS)
+	@mkdir -p $(@D)
+	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -O3 -fsingle-precision-constant -fno-math-errno -fno-trapping-math -c $< -o $@
+
+$(B)/stratus-validate: $(call obj,$(VALIDATE_SRC)) $(TWIN_OBJ) $(B)/librenderer.a
+	$(CC) $(LDFLAGS) $^ -o $@ $(call pkg,--libs,jansson) $(RENDERER_LIBS) -lstdc++
 
 $(B)/%.c.o: %.c
 	@mkdir -p $(@D)
@@ -131,6 +137,8 @@ $(B)/tests/%: tests/unit/%.c $(B)/libserver.a $(B)/librenderer.a
 $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(RENDERER_LIBS)
+$(B)/tests/test_reference_layer $(B)/tests/test_reference_twin: $(TWIN_OBJ)
+$(B)/tests/test_reference_layer $(B)/tests/test_reference_twin: RENDERER_LIBS += -lstdc++
 $(B)/tests/test_validate_bounds: $(call obj,tests/validate/bounds.c)
 $(B)/tests/test_deck: $(call obj,tests/validate/deck.c)
 $(B)/tests/test_exchange: $(call obj,tests/validate/squares.c)

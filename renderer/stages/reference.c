@@ -26,7 +26,7 @@ static const double call_ms = 40;
 
 /* All that one picture needs. Between two calls: what it was made of is the same then, looked up again. */
 struct reference_work {
-	struct texture tops, bounds, inverse, chains;
+	struct reference_tables tables;
 	struct texture sum, squares, slots[GROUPS][GROUP];
 	enum layer slot_layer[GROUPS][GROUP];
 	int slot_count, group_count;
@@ -45,8 +45,17 @@ void reference_stage_init(struct reference_stage *stage, const struct pass_compi
 	*stage = (struct reference_stage){.compiler = *compiler};
 }
 
-static void drop_layers(struct reference_stage *stage)
+static void finish_tables(struct reference_tables *tables)
 {
+	texture_finish(&tables->tops);
+	texture_finish(&tables->bounds);
+	texture_finish(&tables->inverse);
+	texture_finish(&tables->chains);
+}
+
+static void drop_last(struct reference_stage *stage)
+{
+	finish_tables(&stage->tables);
 	for (int i = 0; i < LAYER_COUNT; i++)
 		texture_finish(&stage->layers[i]);
 }
@@ -59,7 +68,7 @@ void reference_stage_finish(struct reference_stage *stage)
 	stage_destroy_passes(stage->tops, VIEW_SIDES);
 	pass_destroy(stage->resolve);
 	disc_buffer_finish(&stage->disc);
-	drop_layers(stage);
+	drop_last(stage);
 	*stage = (struct reference_stage){0};
 }
 
@@ -67,10 +76,7 @@ void reference_work_destroy(struct reference_work *work)
 {
 	if (!work)
 		return;
-	texture_finish(&work->tops);
-	texture_finish(&work->bounds);
-	texture_finish(&work->inverse);
-	texture_finish(&work->chains);
+	finish_tables(&work->tables);
 	texture_finish(&work->sum);
 	texture_finish(&work->squares);
 	for (int i = 0; i < GROUPS * GROUP; i++)
@@ -166,16 +172,16 @@ static bool make_tops(struct reference_stage *stage, const struct scene *scene, 
 	const int side = tops_side(scene, work->side);
 	float(*bounds)[BOUNDS_SIDE] = malloc(sizeof(float[BOUNDS_SIDE][BOUNDS_SIDE]));
 	float *values = malloc((size_t)side * (size_t)side * sizeof *values);
-	const bool ok = pass && bounds && values && texture_init(&work->tops, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
-			texture_init(&work->bounds, BOUNDS_SIDE, BOUNDS_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_NEAREST);
+	const bool ok = pass && bounds && values && texture_init(&work->tables.tops, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
+			texture_init(&work->tables.bounds, BOUNDS_SIDE, BOUNDS_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_NEAREST);
 	if (ok) {
 		const bool above = work->side == VIEW_ABOVE;
-		pass_run(pass, &(struct pass_run){.targets = (struct texture *[]){&work->tops},
+		pass_run(pass, &(struct pass_run){.targets = (struct texture *[]){&work->tables.tops},
 						  .samplers = {above ? field->height : field->coarse, above ? NULL : field->detail},
 						  .arguments = {{(float)side}}});
-		stage_read_texture(&work->tops, 0, 1, values);
+		stage_read_texture(&work->tables.tops, 0, 1, values);
 		find_bounds(values, side, bounds);
-		texture_upload(&work->bounds, &bounds[0][0]);
+		texture_upload(&work->tables.bounds, &bounds[0][0]);
 	}
 	free(values);
 	free(bounds);
@@ -186,12 +192,12 @@ static bool make_droplets(const struct view_inputs *view, struct reference_work 
 {
 	struct path_inverse *inverse = malloc(sizeof *inverse);
 	work->drawn = malloc(sizeof *work->drawn);
-	const bool ok = inverse && work->drawn && texture_init(&work->inverse, PATH_INVERSE_COLUMNS, 1, TEXTURE_RGBA32F, 0) &&
-			texture_init(&work->chains, PATH_CHAINS_A_ROW * PATH_CHAIN_LENGTH, BAND_COUNT * PATH_CHAIN_ROWS, TEXTURE_RGBA32F,
-				     TEXTURE_NEAREST);
+	const bool ok = inverse && work->drawn && texture_init(&work->tables.inverse, PATH_INVERSE_COLUMNS, 1, TEXTURE_RGBA32F, 0) &&
+			texture_init(&work->tables.chains, PATH_CHAINS_A_ROW * PATH_CHAIN_LENGTH, BAND_COUNT * PATH_CHAIN_ROWS,
+				     TEXTURE_RGBA32F, TEXTURE_NEAREST);
 	if (ok) {
 		path_inverse_fill(inverse, view->droplets->tables);
-		texture_upload(&work->inverse, &inverse->unit[0][0]);
+		texture_upload(&work->tables.inverse, &inverse->unit[0][0]);
 	}
 	free(inverse);
 	return ok;
@@ -247,8 +253,9 @@ static struct pass_run run_of(const struct scene *scene, const struct reference_
 	const struct view_inputs *view = inputs->view;
 	return (struct pass_run){.width = scene->output.width,
 				 .samplers = {view->sky->transmittance, view->sky->total, view->sky->near, view->sky->to_layer,
-					      view->sky->to_end, view->ground->map, &view->droplets->phase, &work->tops, &work->bounds,
-					      &work->inverse, &work->chains, inputs->sky_at_layer, inputs->sky_at_ground},
+					      view->sky->to_end, view->ground->map, &view->droplets->phase, &work->tables.tops,
+					      &work->tables.bounds, &work->tables.inverse, &work->tables.chains, inputs->sky_at_layer,
+					      inputs->sky_at_ground},
 				 .arguments = {{(float)round->first, (float)round->samples, (float)(scene->model.seed & 0xffff),
 						(float)(scene->model.seed >> 16)},
 					       {0},
@@ -321,7 +328,7 @@ static enum outcome run_round(struct reference_stage *stage, struct stage_contex
 	if (work->chains_first != round->first) {
 		path_chains_draw(work->drawn, inputs->view->droplets->tables, context->block.sun_direction[3], scene->model.seed,
 				 (uint64_t)round->first);
-		texture_upload(&work->chains, &work->drawn->chain[0][0][0][0][0]);
+		texture_upload(&work->tables.chains, &work->drawn->chain[0][0][0][0][0]);
 		work->chains_first = round->first;
 	}
 	for (; work->view < camera_view_count(scene); work->view++) {
@@ -407,7 +414,7 @@ bool reference_stage_run(struct reference_stage *stage, struct stage_context *co
 	enum outcome outcome = OUTCOME_FAILED;
 	*result = (struct reference_result){0};
 	context->reused = false;
-	drop_layers(stage);
+	drop_last(stage);
 	if (!*work)
 		*work = begin_work(stage, scene, inputs, layers, count);
 	if (*work &&
@@ -420,6 +427,10 @@ bool reference_stage_run(struct reference_stage *stage, struct stage_context *co
 	bool ok = outcome == OUTCOME_DONE || outcome == OUTCOME_TIME_OVER ||
 		  (outcome == OUTCOME_STOPPED && scene->model.partial && result->samples > 0);
 	ok = ok && resolve(stage, scene, layers, count, *work, pictures);
+	if (*work) {
+		stage->tables = (*work)->tables;
+		(*work)->tables = (struct reference_tables){0};
+	}
 	reference_work_destroy(*work);
 	*work = NULL;
 	return ok;

@@ -20,7 +20,11 @@ struct reference_stage {
 	struct pass *paths[VIEW_SIDES][2][PROJECTION_COUNT][2];
 	struct pass *tops[VIEW_SIDES];
 	struct pass *resolve;
-	struct texture layers[LAYER_COUNT]; /* of the last picture */
+	/* Of the last picture: its layers, and what its paths went by (the samplers of shaders/lib/light_path.glsl). */
+	struct texture layers[LAYER_COUNT];
+	struct reference_tables {
+		struct texture tops, bounds, inverse, chains;
+	} tables;
 	struct disc_buffer disc;
 };
 

@@ -29,8 +29,10 @@ const vec3 PATH_HERO_SHARE = vec3(0.3, 0.45, 0.25);
 const int PATH_START = 0;  // leaves the camera
 const int PATH_LAYER = 1;  // flies through the layer
 const int PATH_SUN = 2;    // looks for the sun from there (shaders/lib/light_path_sun.glsl)
-const int PATH_LEAVES = 3; // has left the layer's two spheres
-const int PATH_DONE = 4;
+const int PATH_TURNS = 3;    // is scattered forward on its way to the sun
+const int PATH_SCATTERS = 4; // is scattered
+const int PATH_LEAVES = 5;   // has left the layer's two spheres
+const int PATH_DONE = 6;
 
 struct light_path {
 	vec3 place; // m east, north, up from the camera's foot, on the plane that touches the Earth there
@@ -47,7 +49,8 @@ struct light_path {
 	bool lifted;   // the last thing met was the ground
 	int grounded;  // 0 never, 1 after cloud, 2 before any
 	uint random;
-	int kind; // of light (enum layer) that the search for the sun finds
+	float top; // m above the base, of the cloud at this place
+	int kind;  // of light (enum layer) that the search for the sun finds
 	// Of the search for the sun.
 	vec3 sun;      // what it brings per band
 	float arc;     // m, way in the layer so far
@@ -109,6 +112,13 @@ vec2 path_tile(vec3 place)
 float path_top(vec3 place)
 {
 	return textureLod(path_tops, path_tile(place), 0.0).x;
+}
+
+// The largest height around, for as far as a texel of the bounds reaches.
+float path_bound(vec3 place)
+{
+	vec2 uv = path_tile(place);
+	return texelFetch(path_bounds, ivec2(floor(uv * PATH_BOUNDS_SIZE)) & (int(PATH_BOUNDS_SIZE) - 1), 0).x;
 }
 
 float path_largest_extinction()

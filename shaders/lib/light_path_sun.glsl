@@ -70,7 +70,7 @@ vec3 path_sun_ratio(light_path path, vec4 texel)
 }
 
 // How far the layer reaches towards the sun from a place in it: x, cloud by what stands there; y, the layer itself.
-vec2 path_sun_reach(vec3 place, float height, float mu_sun, float top)
+vec2 path_sun_reach(float height, float mu_sun, float top)
 {
 	float mu = mu_sun < 0.0 ? min(mu_sun, -0.01) : max(mu_sun, 0.01);
 	float base = cloud_layer.x;
@@ -78,17 +78,17 @@ vec2 path_sun_reach(vec3 place, float height, float mu_sun, float top)
 }
 
 // Begins to look for the sun. place: where the straight way to the sun enters the layer; height above ground, cosine of the sun there. The number of forward
-// scatterings is drawn, and with it the direction to begin with. Returns what the way brings by itself, densities included, per band; 0: not worth looking.
-vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_sun)
+// scatterings is drawn, and with it the direction to begin with. top: of the cloud there. Returns what the way brings by itself, densities included, per band; 0: not worth
+// looking.
+vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_sun, float top)
 {
-	float hero_extinction = path_of_hero(vec3(extinction), path.hero);
 	float hero_modified = path_of_hero(vec3(extinction_modified), path.hero);
 	vec3 peak = vec3(extinction) - vec3(extinction_modified);
 	float hero_peak = path_of_hero(peak, path.hero);
 	float longest = 8.0 / hero_peak;
-	vec2 reach = path_sun_reach(place, height, mu_sun, path_top(place));
+	vec2 reach = path_sun_reach(height, mu_sun, top);
 	vec3 out_there = place + vec3(sun_direction) * min(reach.x, longest);
-	reach.x = min(reach.x, path_sun_reach(place, height, mu_sun, path_top(out_there)).x);
+	reach.x = min(reach.x, path_sun_reach(height, mu_sun, path_top(out_there)).x);
 	float expected = min(reach.x, longest);
 	path.spans = vec3(expected, min(expected + PATH_LIKELY_REACH, reach.y), reach.y);
 	path.arc = 0.0;
@@ -127,25 +127,24 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 	return looks && count < PATH_CHAIN_LENGTH ? weight * lets : vec3(0.0);
 }
 
-// Cloud or not at a place that the search for the sun has come to; collided: by a free path, else by the next forward scattering. Returns false when nothing is left.
-bool path_sun_meets(INOUT(light_path) path, bool inside, bool collided, float largest)
+// A free path of the search ends inside the cloud or outside of it. false when nothing is left.
+bool path_sun_collides(INOUT(light_path) path, bool inside, float largest)
 {
-	bool alive = true;
 	bool expected = path.arc < path.spans.x;
-	if (collided) {
-		vec3 factor = vec3(1.0) - vec3(extinction) * ((inside ? 1.0 : 0.0) - (expected ? 1.0 : 0.0)) / largest;
-		// Where cloud is unexpected hardly anything is left.
-		float most = clamp(max(factor.x, max(factor.y, factor.z)), 0.0, 1.0);
-		alive = path_random(path) < most;
-		path.sun *= factor / max(most, 1e-6);
-	} else {
-		alive = inside;
-		float share = expected ? 1.0 : path.arc < path.spans.y ? PATH_LIKELY : path_sun_unlikely(path.spans);
-		path.sun /= share;
-		path.left = max(path.left - 1, 0);
-		path.direction = path_sun_direction(path, path_sun_texel(path));
-		path_sun_draw_next(path);
-	}
-	return alive;
+	vec3 factor = vec3(1.0) - vec3(extinction) * ((inside ? 1.0 : 0.0) - (expected ? 1.0 : 0.0)) / largest;
+	// Where cloud is unexpected hardly anything is left.
+	float most = clamp(max(factor.x, max(factor.y, factor.z)), 0.0, 1.0);
+	path.sun *= factor / max(most, 1e-6);
+	return path_random(path) < most;
+}
+
+// The next forward scattering, in cloud.
+void path_sun_turns(INOUT(light_path) path)
+{
+	path.sun /= path.arc < path.spans.x ? 1.0 : path.arc < path.spans.y ? PATH_LIKELY : path_sun_unlikely(path.spans);
+	path.left = max(path.left - 1, 0);
+	path.direction = path_sun_direction(path, path_sun_texel(path));
+	path_sun_draw_next(path);
+	path.mode = PATH_SUN;
 }
 #endif

@@ -26,8 +26,11 @@ const int KIND_TRANSMITTANCE = 11;
 const int KIND_OPTICAL_THICKNESS = 12;
 const int KIND_DISTANCE = 13;
 
-// Steps between two looks at what happens seldom: processors that run pixels in step with each other do it for all or none.
-const int REFERENCE_STEPS = 8;
+// Processors that run pixels in step with each other do everything for all of them or none, so that what happens seldom is done seldom: so many scatterings before the ends of
+// flights are looked at, so many turns of searches before a scattering, so many steps before a turn.
+const int REFERENCE_SCATTERINGS = 4;
+const int REFERENCE_TURNS = 2;
+const int REFERENCE_STEPS = 2;
 
 struct reference_sums {
 	vec3 light; // of this sample, in the bands
@@ -125,10 +128,10 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.lifted = false;
 	path.grounded = 0;
 	sums.light = vec3(0.0);
-	float top = cloud_layer.x + cloud_layer.y;
 	float h = camera_position.z;
 	float mu = path.direction.z;
 #if REFERENCE_ABOVE
+	float top = cloud_layer.x + cloud_layer.y;
 	float t = h > top ? sphere_distance_down(h, mu, top) : 0.0;
 #else
 	float t = mu > sphere_horizon(h) ? sphere_distance_up(h, mu, cloud_layer.x) : -1.0;
@@ -151,18 +154,13 @@ void reference_resume(INOUT(light_path) path)
 }
 
 // A scattering in cloud.
-void reference_scatter(INOUT(light_path) path, INOUT(reference_sums) sums)
+void reference_scatter(INOUT(light_path) path)
 {
-#if REFERENCE_LAYERS && REFERENCE_ABOVE
-	if (path.first)
-		reference_keep(sums, KIND_OPTICAL_THICKNESS, vec3(extinction.y * path_top(path.place)));
-#endif
-	reference_first(path, sums, 0, vec3(0.0));
 	path.ratio *= vec3(extinction) / path_of_hero(vec3(extinction), path.hero);
 	vec3 before = path.direction;
 	float height = path_height(path.place);
 	float mu_sun = clamp(dot(path_up(path.place), vec3(sun_direction)), -1.0, 1.0);
-	vec3 weight = path_sun_begin(path, path.place, height, mu_sun);
+	vec3 weight = path_sun_begin(path, path.place, height, mu_sun, path.top);
 	vec3 to_sun = path.direction;
 	vec2 half_angle = scattering_half_angle(before, to_sun);
 	bool forward = half_angle.x < FORWARD_PEAK_SINE;
@@ -176,10 +174,20 @@ void reference_scatter(INOUT(light_path) path, INOUT(reference_sums) sums)
 	path.lifted = false;
 	path.kept_place = path.place;
 	path.kept_direction = path.direction;
+	path.mode = PATH_LAYER;
 	if (counts && path.sun.x + path.sun.y + path.sun.z > 0.0) {
 		path.mode = PATH_SUN;
 		path.direction = to_sun;
 	}
+}
+
+// The first one.
+void reference_meet_cloud(INOUT(light_path) path, INOUT(reference_sums) sums)
+{
+#if REFERENCE_ABOVE
+	reference_keep(sums, KIND_OPTICAL_THICKNESS, vec3(extinction.y * path.top));
+#endif
+	reference_first(path, sums, 0, vec3(0.0));
 }
 
 // On the ground, t m ahead.
@@ -198,7 +206,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float base = cloud_layer.x;
 	float mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
 	vec3 entry = path.place + vec3(sun_direction) * sphere_distance_up(0.0, max(mu_sun, 0.0), base);
-	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01)) * sun_irradiance(0.0, mu_sun);
+	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01), path_top(entry)) * sun_irradiance(0.0, mu_sun);
 	float mu_out = dot(up, path.direction);
 	path.sun *= max(mu_out, 0.0) / PI;
 	// Half of all light starts above 45 degrees: Lambert's law.
@@ -248,7 +256,7 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 	bool searches = path.mode == PATH_SUN;
 	float largest = path_largest_extinction();
 	float mu = dot(path_up(path.place), path.direction);
-	float over = path_height(path.place) - cloud_layer.x - textureLod(path_bounds, path_tile(path.place), 0.0).x;
+	float over = path_height(path.place) - cloud_layer.x - path_bound(path.place);
 	// Nothing stands so high around here: on to where it might.
 	bool empty = over > 1.0;
 	float reach = cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
@@ -265,7 +273,8 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 	path.place += path.direction * t;
 	path.arc += t;
 	float height = path_height(path.place) - cloud_layer.x;
-	bool inside = height >= 0.0 && height < path_top(path.place);
+	path.top = path_top(path.place);
+	bool inside = height >= 0.0 && height < path.top;
 	if (height < 0.0 || height > cloud_layer.y) {
 		if (searches) {
 			reference_add(sums, path.kind, path.left == 0 ? path.sun : vec3(0.0));
@@ -274,12 +283,14 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 			path.mode = PATH_LEAVES;
 		}
 	} else if (searches) {
-		if (!(empty && collided) && !path_sun_meets(path, inside, collided, largest))
+		if (!collided && inside)
+			path.mode = PATH_TURNS;
+		else if (!collided || (!empty && !path_sun_collides(path, inside, largest)))
 			reference_resume(path);
 	} else if (!empty && inside) {
 		float hero = path_of_hero(vec3(extinction), path.hero);
 		if (path_random(path) * largest < hero)
-			reference_scatter(path, sums);
+			path.mode = PATH_SCATTERS;
 		else
 			path.ratio *= (vec3(largest) - vec3(extinction)) / max(largest - hero, 1e-12);
 	}
@@ -306,12 +317,20 @@ void pass(ivec2 pixel)
 	while (number < end) {
 		if (path.mode == PATH_START)
 			reference_start(path, sums, pixel, number);
-		for (int i = 0; i < REFERENCE_STEPS; i++) {
-			if (path.mode == PATH_LAYER || path.mode == PATH_SUN)
-				reference_step(path, sums);
-			else
-				break;
+		for (int i = 0; i < REFERENCE_SCATTERINGS; i++) {
+			for (int k = 0; k < REFERENCE_TURNS; k++) {
+				for (int m = 0; m < REFERENCE_STEPS; m++)
+					if (path.mode == PATH_LAYER || path.mode == PATH_SUN)
+						reference_step(path, sums);
+				if (path.mode == PATH_TURNS)
+					path_sun_turns(path);
+			}
+			// The first is left to the end of this, for all that comes with it.
+			if (path.mode == PATH_SCATTERS && !path.first)
+				reference_scatter(path);
 		}
+		if (path.mode == PATH_SCATTERS && path.first)
+			reference_meet_cloud(path, sums);
 		if (path.mode == PATH_LEAVES)
 			reference_leave(path, sums, disc);
 		if (path.mode == PATH_DONE) {

@@ -35,6 +35,7 @@ enum tally_id {
 	TALLY_DECK_BASE,
 	TALLY_DECK_REFERENCE,
 	TALLY_DECK_BALANCE,
+	TALLY_PUFFED_BALANCE,
 	TALLY_WATER_SKY, /* relative */
 	TALLY_COLD,      /* ms: least of several, of one distribution */
 	TALLY_DISK,
@@ -73,7 +74,7 @@ struct bound {
 	const char *unit; /* "%" shows it times 100 */
 };
 
-enum { BOUND_COUNT = 37 };
+enum { BOUND_COUNT = 38 };
 extern const struct bound bounds[BOUND_COUNT];
 
 enum verdict { VERDICT_REACHED, VERDICT_TOLERATED, VERDICT_BROKEN };

@@ -208,7 +208,8 @@ bool comparison_to_png(const struct comparison *comparison, const char *json, co
 			      .type = PIXEL_U8,
 			      .channels = 3,
 			      .layer_count = 1,
-			      .layer = {LAYER_COLOR}};
+			      .layer = {LAYER_COLOR},
+			      .exposure_ev = comparison->exposure_ev};
 	struct scene scene = *truth_scene(comparison);
 	scene.output.format = IMAGE_PNG;
 	scene.output.bits = 8;

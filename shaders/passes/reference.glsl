@@ -127,6 +127,9 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.straight = true;
 	path.lifted = false;
 	path.grounded = 0;
+	path.arc = 0.0;
+	path.reach = 1.0;
+	path.cloudy = 0;
 	sums.light = vec3(0.0);
 	float h = camera_position.z;
 	float mu = path.direction.z;
@@ -160,7 +163,7 @@ void reference_scatter(INOUT(light_path) path)
 	vec3 before = path.direction;
 	float height = path_height(path.place);
 	float mu_sun = clamp(dot(path_up(path.place), vec3(sun_direction)), -1.0, 1.0);
-	vec3 weight = path_sun_begin(path, path.place, height, mu_sun, path.top);
+	vec3 weight = path_sun_begin(path, path.place, height, mu_sun);
 	vec3 to_sun = path.direction;
 	vec2 half_angle = scattering_half_angle(before, to_sun);
 	bool forward = half_angle.x < FORWARD_PEAK_SINE;
@@ -206,7 +209,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float base = cloud_layer.x;
 	float mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
 	vec3 entry = path.place + vec3(sun_direction) * sphere_distance_up(0.0, max(mu_sun, 0.0), base);
-	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01), path_top(entry)) * sun_irradiance(0.0, mu_sun);
+	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01)) * sun_irradiance(0.0, mu_sun);
 	float mu_out = dot(up, path.direction);
 	path.sun *= max(mu_out, 0.0) / PI;
 	// Half of all light starts above 45 degrees: Lambert's law.
@@ -257,19 +260,21 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 	float largest = path_largest_extinction();
 	float mu = dot(path_up(path.place), path.direction);
 	float over = path_height(path.place) - cloud_layer.x - path_bound(path.place);
-	// Nothing stands so high around here: on to where it might.
-	bool empty = over > 1.0;
+	// Nothing stands so high around here: on to where it might, or to where the search expects cloud.
+	int part = path_part_at(path.arc / path.reach);
+	bool empty = over > 1.0 && !(searches && path_part_cloudy(path.cloudy, part));
 	float reach = cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
 	float t = -log(path_random(path)) / largest;
-	if (empty)
+	if (empty) {
 		t = mu < 0.0 ? min(reach, over / -mu) : reach;
+		if (searches && part < PATH_PARTS - 1)
+			t = min(t, path_part_start(part + 1) * path.reach - path.arc + 0.1);
+	}
 	bool collided = true;
 	if (searches && path.arc + t >= path.next) {
 		t = max(path.next - path.arc, 0.0);
 		collided = false;
 	}
-	if (searches && empty)
-		path.sun *= exp(vec3(extinction) * clamp(path.spans.x - path.arc, 0.0, t));
 	path.place += path.direction * t;
 	path.arc += t;
 	float height = path_height(path.place) - cloud_layer.x;

@@ -4,6 +4,7 @@
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/colour.glsl"
 #include "shaders/lib/ground.glsl"
+#include "shaders/lib/ground_near.glsl"
 #include "shaders/lib/light_path_sun.glsl"
 #include "shaders/lib/sun_disc.glsl"
 
@@ -201,8 +202,27 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float mu_v = clamp(-dot(up, path.direction), 0.002, 1.0);
 	float footprint = path.first ? camera_position.w * t * pow(mu_v, -0.75) : 20.0;
 	path.grounded = path.first ? 2 : max(path.grounded, 1);
+	vec2 detail = vec2(1.0);
+	vec2 there = vec2(path.place) + vec2(camera_position);
+#if VIEW_GROUND == 2
+	vec3 reflectance = ground_reflectance(there, footprint);
+#else
+	// What the camera itself sees has all that the slab's view shows of it.
+	ground_point point;
+	point.offset = vec2(path.place);
+	point.across = camera_position.w * t;
+	point.mu_v = mu_v;
+	point.mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
+	if (path.grounded == 2 && path.first)
+		detail = ground_detail(point);
+#if VIEW_GROUND == 3
+	vec3 reflectance = ground_ice(ground_reflectance(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
+#else
+	vec3 reflectance = ground_reflectance(there, footprint);
+#endif
+#endif
 	reference_first(path, sums, 1, vec3(0.0));
-	path.share *= ground_reflectance(vec2(path.place) + vec2(camera_position), footprint);
+	path.share *= reflectance * detail.y;
 	path.straight = false;
 	path.lifted = true;
 	path.kind = reference_kind(path, KIND_GROUND);
@@ -211,7 +231,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	vec3 entry = path.place + vec3(sun_direction) * sphere_distance_up(0.0, max(mu_sun, 0.0), base);
 	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01)) * sun_irradiance(0.0, mu_sun);
 	float mu_out = dot(up, path.direction);
-	path.sun *= max(mu_out, 0.0) / PI;
+	path.sun *= detail.x * max(mu_out, 0.0) / PI;
 	// Half of all light starts above 45 degrees: Lambert's law.
 	float share = path_random(path);
 	float around = path_random(path);

@@ -238,6 +238,7 @@ static struct scene make_scene(int number)
 	scene.clouds.tile_m = 8000;
 	scene.clouds.thickness_m = 250;
 	scene.camera.azimuth_deg = 60;
+	scene.ground.type = GROUND_SAND; /* the twin's ground is bare */
 	scene.camera.elevation_deg = number == 0 ? 35 : -35;
 	if (number > 0)
 		scene.camera.position_m[2] = 3000;

@@ -370,7 +370,7 @@ static const struct texture *sky_from(struct job *job, double height)
 	return ok ? sky.total : NULL;
 }
 
-/* Cancelled or not: what there is is a picture from here on. */
+/* Cancelled or not: what there is is a picture from here on. Without clouds the view stage's picture is the reference too. */
 static bool run_reference(struct job *job, const struct view_inputs *view)
 {
 	const struct scene *scene = job->scene;
@@ -420,6 +420,8 @@ static bool run_view(struct job *job)
 	if (job->scene->ground.type == GROUND_SEA && !run_sea(job, &inputs))
 		return false;
 	const bool reference = job->scene->model.name == MODEL_REFERENCE && job->clouds;
+	if (job->scene->model.name == MODEL_REFERENCE)
+		frame->samples = job->scene->model.samples;
 	if (reference ? !run_reference(job, &inputs)
 		      : !view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
 					job->cancel_context, job->pictures))

@@ -32,6 +32,7 @@ struct reference_work {
 	int slot_count, group_count;
 	struct path_chains *drawn;
 	enum view_side side;
+	enum view_ground ground;
 	double rows; /* of a call */
 
 	int samples;      /* rounds that are done */
@@ -62,7 +63,7 @@ static void drop_last(struct reference_stage *stage)
 
 void reference_stage_finish(struct reference_stage *stage)
 {
-	struct pass **paths = &stage->paths[0][0][0][0];
+	struct pass **paths = &stage->paths[0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->paths / sizeof *paths; i++)
 		pass_destroy(paths[i]);
 	stage_destroy_passes(stage->tops, VIEW_SIDES);
@@ -92,11 +93,12 @@ int reference_work_samples(const struct reference_work *work)
 
 /* --- programs ------------------------------------------------------------------------------------------------------------------- */
 
-static const struct pass *paths_pass(struct reference_stage *stage, enum view_side side, bool layers, enum projection projection,
+static const struct pass *paths_pass(struct reference_stage *stage, const struct reference_work *work, enum projection projection,
 				     bool large)
 {
-	struct pass **pass = &stage->paths[side][layers][projection][large];
-	char defines[160];
+	const bool layers = work->slot_count > 0;
+	struct pass **pass = &stage->paths[work->side][layers][projection][large][work->ground];
+	char defines[200];
 	const struct pass_desc desc = {.file = "shaders/passes/reference.glsl",
 				       .defines = defines,
 				       .outputs = layers ? 2 + GROUP : 2,
@@ -105,8 +107,9 @@ static const struct pass *paths_pass(struct reference_stage *stage, enum view_si
 						    "forward_chains", "sky_at_layer", "sky_at_ground"},
 				       .adds = true};
 	snprintf(defines, sizeof defines,
-		 "#define REFERENCE_ABOVE %d\n#define REFERENCE_LAYERS %d\n#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n",
-		 side == VIEW_ABOVE, layers, projection, large);
+		 "#define REFERENCE_ABOVE %d\n#define REFERENCE_LAYERS %d\n#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n"
+		 "#define VIEW_GROUND %d\n",
+		 work->side == VIEW_ABOVE, layers, projection, large, work->ground);
 	if (!*pass)
 		*pass = pass_create(&stage->compiler, &desc);
 	return *pass;
@@ -267,8 +270,7 @@ static bool run_rows(struct reference_stage *stage, const struct camera_view *vi
 		     struct pass_run *run)
 {
 	for (int group = 0; group < work->group_count; group++) {
-		const bool slots = work->slot_count > 0;
-		const struct pass *pass = paths_pass(stage, work->side, slots, view->projection, large);
+		const struct pass *pass = paths_pass(stage, work, view->projection, large);
 		struct texture *targets[2 + GROUP] = {group == 0 ? &work->sum : NULL, group == 0 ? &work->squares : NULL};
 		for (int i = 0; i < GROUP; i++) {
 			const bool used = group * GROUP + i < work->slot_count;
@@ -399,6 +401,7 @@ static struct reference_work *begin_work(struct reference_stage *stage, const st
 	if (!work)
 		return NULL;
 	work->side = scene->camera.position_m[2] < scene->clouds.base_m ? VIEW_BELOW : VIEW_ABOVE;
+	work->ground = view_ground_of(scene);
 	work->rows = 1;
 	work->chains_first = -1;
 	if (make_tops(stage, scene, inputs->view, work) && make_droplets(inputs->view, work) && make_sums(scene, layers, count, work))

@@ -16,8 +16,8 @@
 
 struct reference_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	/* By side, layers, projection, large sun; the second by side. Made with the first picture that wants them. */
-	struct pass *paths[VIEW_SIDES][2][PROJECTION_COUNT][2];
+	/* By side, layers, projection, large sun, ground; the second by side. Made with the first picture that wants them. */
+	struct pass *paths[VIEW_SIDES][2][PROJECTION_COUNT][2][VIEW_GROUNDS];
 	struct pass *tops[VIEW_SIDES];
 	struct pass *resolve;
 	/* Of the last picture: its layers, and what its paths went by (the samplers of shaders/lib/light_path.glsl). */

@@ -34,6 +34,11 @@ static const struct pass_desc develop_descs[2] = {
 static const enum view_ground grounds[GROUND_TYPE_COUNT] = {
 	[GROUND_GRASS] = VIEW_GROWN, [GROUND_COUNTRY] = VIEW_GROWN, [GROUND_SEA] = VIEW_SEA, [GROUND_SEA_ICE] = VIEW_ICE};
 
+enum view_ground view_ground_of(const struct scene *scene)
+{
+	return grounds[scene->ground.type];
+}
+
 struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
 	char defines[320];
@@ -368,7 +373,7 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 				    bool layers)
 {
 	const enum view_side side = side_of(scene, inputs);
-	const enum view_ground ground = grounds[scene->ground.type];
+	const enum view_ground ground = view_ground_of(scene);
 	if (side == VIEW_CLEAR)
 		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground};
 	return (struct view_variant){.side = side,

@@ -61,6 +61,8 @@ struct view_inputs {
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler);
 void view_stage_finish(struct view_stage *stage);
 
+enum view_ground view_ground_of(const struct scene *scene);
+
 /* Fills in the block's camera, of the picture's first view. Call before any pass runs, since the sky is tabulated from the camera's height.
  */
 void view_fill_block(struct scene_block *block, const struct scene *scene);

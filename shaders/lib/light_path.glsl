@@ -55,8 +55,9 @@ struct light_path {
 	vec3 sun;      // what it brings per band
 	float arc;     // m, way in the layer so far
 	float next;    // m, where it is scattered next
-	float weight;  // of ways, so far, as path_sun_weigh counts them
-	vec3 spans;    // m: cloud expected up to x; likely up to y; the layer ends at z
+	float weight;  // of the way up to there, as path_sun_weight counts it
+	float reach;   // m, up to the end of the layer
+	int cloudy;    // parts of that way that are expected to lie in cloud, as a bit set
 	int left;      // scatterings to come
 	ivec2 chain;
 	vec2 turn;     // cosine and sine of the angle by which the chain is turned about the sun

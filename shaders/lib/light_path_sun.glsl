@@ -15,36 +15,58 @@
 // from the middle of the sun along two axes; z, w: densities of the next two bands, in turn, over the hero's.
 const int PATH_CHAIN_LENGTH = 16;
 const int PATH_CHAIN_ROWS = 64;
-// Where no cloud is expected there may be some: share of the forward scatterings looked for close behind what is expected, m.
-const float PATH_LIKELY = 0.25;
-const float PATH_LIKELY_REACH = 100.0;
+// The way to the sun is looked at in so many parts, short ones first.
+const int PATH_PARTS = 10;
+// Where no cloud is expected there may be some: share of the forward scatterings looked for beside cloud, and away from it.
+const float PATH_BESIDE = 0.4;
+const float PATH_AWAY = 0.1;
 
-// Of the way behind that.
-float path_sun_unlikely(vec3 spans)
+// Where a part begins, over the whole way; and the part at a place.
+float path_part_start(int part)
 {
-	return clamp(15.0 / max(spans.z - spans.y, 1.0), 0.001, 0.05);
+	return float(part * (part + 4)) * (1.0 / float(PATH_PARTS * (PATH_PARTS + 4)));
 }
 
-// Ways weighed by the share of scatterings that are looked for on them.
-vec3 path_sun_weights(vec3 spans)
+int path_part_at(float way)
 {
-	float likely = spans.x + PATH_LIKELY * (spans.y - spans.x);
-	return vec3(spans.x, likely, likely + path_sun_unlikely(spans) * (spans.z - spans.y));
+	return min(int(sqrt(4.0 + float(PATH_PARTS * (PATH_PARTS + 4)) * max(way, 0.0)) - 2.0), PATH_PARTS - 1);
 }
 
-// Draws where the path is scattered next.
-void path_sun_draw_next(INOUT(light_path) path)
+bool path_part_cloudy(int cloudy, int part)
 {
-	vec3 weights = path_sun_weights(path.spans);
-	if (path.left == 0) {
-		path.next = 1e9;
-	} else {
-		float share = pow(path_random(path), 1.0 / float(path.left));
-		path.weight = mix(weights.z, path.weight, share);
-		float behind = path.spans.y + (path.weight - weights.y) / path_sun_unlikely(path.spans);
-		float close = path.spans.x + (path.weight - weights.x) / PATH_LIKELY;
-		path.next = path.weight < weights.x ? path.weight : path.weight < weights.y ? close : behind;
+	return ((cloudy >> part) & 1) != 0;
+}
+
+// Share of the forward scatterings in cloud that are looked for in a part.
+float path_part_share(int cloudy, int part)
+{
+	return path_part_cloudy(cloudy, part) ? 1.0 : (((cloudy << 1) >> part) & 5) != 0 ? PATH_BESIDE : PATH_AWAY;
+}
+
+// Draws where the path is scattered next: x of a uniform density over the rest of the ways as they are weighed.
+void path_sun_draw_next(INOUT(light_path) path, float whole)
+{
+	float share = pow(path_random(path), 1.0 / float(max(path.left, 1)));
+	path.weight = mix(whole, path.weight, share);
+	float rest = path.weight;
+	float at = -1.0;
+	for (int i = 0; i < PATH_PARTS; i++) {
+		float from = path_part_start(i);
+		float size = path_part_start(i + 1) - from;
+		float part_share = path_part_share(path.cloudy, i);
+		at = at < 0.0 && rest <= size * part_share ? from + rest / part_share : at;
+		rest -= size * part_share;
 	}
+	path.next = path.left == 0 ? 1e9 : (at < 0.0 ? 1.0 : at) * path.reach;
+}
+
+// The whole way, weighed, over its length.
+float path_sun_whole(int cloudy)
+{
+	float sum = 0.0;
+	for (int i = 0; i < PATH_PARTS; i++)
+		sum += (path_part_start(i + 1) - path_part_start(i)) * path_part_share(cloudy, i);
+	return sum;
 }
 
 vec4 path_sun_texel(light_path path)
@@ -69,35 +91,45 @@ vec3 path_sun_ratio(light_path path, vec4 texel)
 	return path.hero == 0 ? vec3(1.0, texel.z, texel.w) : path.hero == 1 ? vec3(texel.w, 1.0, texel.z) : vec3(texel.z, texel.w, 1.0);
 }
 
-// How far the layer reaches towards the sun from a place in it: x, cloud by what stands there; y, the layer itself.
-vec2 path_sun_reach(float height, float mu_sun, float top)
+// How far the layer reaches towards the sun from a place in it, m.
+float path_sun_reach(float height, float mu_sun)
 {
 	float mu = mu_sun < 0.0 ? min(mu_sun, -0.01) : max(mu_sun, 0.01);
-	float base = cloud_layer.x;
-	return mu < 0.0 ? vec2((base - height) / mu) : max(vec2(base + top - height, base + cloud_layer.y - height) / mu, vec2(0.0));
+	return max(mu < 0.0 ? (cloud_layer.x - height) / mu : (cloud_layer.x + cloud_layer.y - height) / mu, 0.01);
+}
+
+// Looks at the straight way from a place to the sun: which parts of it lie in cloud.
+int path_sun_look(vec3 place, float height, float mu_sun, float reach)
+{
+	int cloudy = 0;
+	for (int i = 0; i < PATH_PARTS; i++) {
+		float t = 0.5 * (path_part_start(i) + path_part_start(i + 1)) * reach;
+		float over = height - cloud_layer.x + mu_sun * t;
+		cloudy |= over >= 0.0 && over < path_top(place + vec3(sun_direction) * t) ? 1 << i : 0;
+	}
+	return cloudy;
 }
 
 // Begins to look for the sun. place: where the straight way to the sun enters the layer; height above ground, cosine of the sun there. The number of forward
-// scatterings is drawn, and with it the direction to begin with. top: of the cloud there. Returns what the way brings by itself, densities included, per band; 0: not worth
+// scatterings is drawn, and with it the direction to begin with. Returns what the way brings by itself, densities included, per band; 0: not worth
 // looking.
-vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_sun, float top)
+vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_sun)
 {
-	float hero_modified = path_of_hero(vec3(extinction_modified), path.hero);
 	vec3 peak = vec3(extinction) - vec3(extinction_modified);
 	float hero_peak = path_of_hero(peak, path.hero);
-	float longest = 8.0 / hero_peak;
-	vec2 reach = path_sun_reach(height, mu_sun, top);
-	vec3 out_there = place + vec3(sun_direction) * min(reach.x, longest);
-	reach.x = min(reach.x, path_sun_reach(height, mu_sun, path_top(out_there)).x);
-	float expected = min(reach.x, longest);
-	path.spans = vec3(expected, min(expected + PATH_LIKELY_REACH, reach.y), reach.y);
+	path.reach = path_sun_reach(height, mu_sun);
+	path.cloudy = path_sun_look(place, height, mu_sun, path.reach);
 	path.arc = 0.0;
 	path.weight = 0.0;
+	float expected = 0.0;
+	for (int i = 0; i < PATH_PARTS; i++)
+		expected += path_part_cloudy(path.cloudy, i) ? (path_part_start(i + 1) - path_part_start(i)) * path.reach : 0.0;
+	float whole = path_sun_whole(path.cloudy);
 
-	float patience = clamp(4.0 * exp(-hero_modified * expected), 0.03, 1.0);
+	float patience = clamp(4.0 * exp(-path_of_hero(vec3(extinction_modified), path.hero) * expected), 0.03, 1.0);
 	bool looks = path_random(path) < patience;
 	// Poisson's law by inversion.
-	float way = path_sun_weights(path.spans).z;
+	float way = whole * path.reach;
 	float mean = hero_peak * way;
 	float term = exp(-mean);
 	float sum = term;
@@ -120,7 +152,7 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 	// More forward scatterings than a chain holds are left out: a share of 1e-5 of what gets through so much cloud at all.
 	vec3 lets = exp(vec3(mean) - vec3(extinction) * expected) / patience;
 	vec3 densities = path_sun_ratio(path, texel) * exp((vec3(hero_peak) - peak) * way);
-	path_sun_draw_next(path);
+	path_sun_draw_next(path, whole);
 	// The way's own density stands in path_weight as exp(-peak way), of which `lets` holds the hero's inverse.
 	vec3 own = path_sun_ratio(path, texel);
 	vec3 weight = path.share * path.ratio * own / max(dot(PATH_HERO_SHARE, path.ratio * densities), 1e-30);
@@ -130,7 +162,7 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 // A free path of the search ends inside the cloud or outside of it. false when nothing is left.
 bool path_sun_collides(INOUT(light_path) path, bool inside, float largest)
 {
-	bool expected = path.arc < path.spans.x;
+	bool expected = path_part_cloudy(path.cloudy, path_part_at(path.arc / path.reach));
 	vec3 factor = vec3(1.0) - vec3(extinction) * ((inside ? 1.0 : 0.0) - (expected ? 1.0 : 0.0)) / largest;
 	// Where cloud is unexpected hardly anything is left.
 	float most = clamp(max(factor.x, max(factor.y, factor.z)), 0.0, 1.0);
@@ -141,10 +173,10 @@ bool path_sun_collides(INOUT(light_path) path, bool inside, float largest)
 // The next forward scattering, in cloud.
 void path_sun_turns(INOUT(light_path) path)
 {
-	path.sun /= path.arc < path.spans.x ? 1.0 : path.arc < path.spans.y ? PATH_LIKELY : path_sun_unlikely(path.spans);
+	path.sun /= path_part_share(path.cloudy, path_part_at(path.arc / path.reach));
 	path.left = max(path.left - 1, 0);
 	path.direction = path_sun_direction(path, path_sun_texel(path));
-	path_sun_draw_next(path);
+	path_sun_draw_next(path, path_sun_whole(path.cloudy));
 	path.mode = PATH_SUN;
 }
 #endif

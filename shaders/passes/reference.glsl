@@ -4,6 +4,7 @@
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/colour.glsl"
 #include "shaders/lib/ground.glsl"
+#include "shaders/lib/ground_near.glsl"
 #include "shaders/lib/light_path_sun.glsl"
 #include "shaders/lib/sun_disc.glsl"
 
@@ -127,6 +128,9 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.straight = true;
 	path.lifted = false;
 	path.grounded = 0;
+	path.arc = 0.0;
+	path.reach = 1.0;
+	path.cloudy = 0;
 	sums.light = vec3(0.0);
 	float h = camera_position.z;
 	float mu = path.direction.z;
@@ -160,7 +164,7 @@ void reference_scatter(INOUT(light_path) path)
 	vec3 before = path.direction;
 	float height = path_height(path.place);
 	float mu_sun = clamp(dot(path_up(path.place), vec3(sun_direction)), -1.0, 1.0);
-	vec3 weight = path_sun_begin(path, path.place, height, mu_sun, path.top);
+	vec3 weight = path_sun_begin(path, path.place, height, mu_sun);
 	vec3 to_sun = path.direction;
 	vec2 half_angle = scattering_half_angle(before, to_sun);
 	bool forward = half_angle.x < FORWARD_PEAK_SINE;
@@ -198,17 +202,36 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float mu_v = clamp(-dot(up, path.direction), 0.002, 1.0);
 	float footprint = path.first ? camera_position.w * t * pow(mu_v, -0.75) : 20.0;
 	path.grounded = path.first ? 2 : max(path.grounded, 1);
+	vec2 detail = vec2(1.0);
+	vec2 there = vec2(path.place) + vec2(camera_position);
+#if VIEW_GROUND == 2
+	vec3 reflectance = ground_reflectance(there, footprint);
+#else
+	// What the camera itself sees has all that the slab's view shows of it.
+	ground_point point;
+	point.offset = vec2(path.place);
+	point.across = camera_position.w * t;
+	point.mu_v = mu_v;
+	point.mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
+	if (path.grounded == 2 && path.first)
+		detail = ground_detail(point);
+#if VIEW_GROUND == 3
+	vec3 reflectance = ground_ice(ground_reflectance(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
+#else
+	vec3 reflectance = ground_reflectance(there, footprint);
+#endif
+#endif
 	reference_first(path, sums, 1, vec3(0.0));
-	path.share *= ground_reflectance(vec2(path.place) + vec2(camera_position), footprint);
+	path.share *= reflectance * detail.y;
 	path.straight = false;
 	path.lifted = true;
 	path.kind = reference_kind(path, KIND_GROUND);
 	float base = cloud_layer.x;
 	float mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
 	vec3 entry = path.place + vec3(sun_direction) * sphere_distance_up(0.0, max(mu_sun, 0.0), base);
-	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01), path_top(entry)) * sun_irradiance(0.0, mu_sun);
+	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01)) * sun_irradiance(0.0, mu_sun);
 	float mu_out = dot(up, path.direction);
-	path.sun *= max(mu_out, 0.0) / PI;
+	path.sun *= detail.x * max(mu_out, 0.0) / PI;
 	// Half of all light starts above 45 degrees: Lambert's law.
 	float share = path_random(path);
 	float around = path_random(path);
@@ -257,19 +280,21 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 	float largest = path_largest_extinction();
 	float mu = dot(path_up(path.place), path.direction);
 	float over = path_height(path.place) - cloud_layer.x - path_bound(path.place);
-	// Nothing stands so high around here: on to where it might.
-	bool empty = over > 1.0;
+	// Nothing stands so high around here: on to where it might, or to where the search expects cloud.
+	int part = path_part_at(path.arc / path.reach);
+	bool empty = over > 1.0 && !(searches && path_part_cloudy(path.cloudy, part));
 	float reach = cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
 	float t = -log(path_random(path)) / largest;
-	if (empty)
+	if (empty) {
 		t = mu < 0.0 ? min(reach, over / -mu) : reach;
+		if (searches && part < PATH_PARTS - 1)
+			t = min(t, path_part_start(part + 1) * path.reach - path.arc + 0.1);
+	}
 	bool collided = true;
 	if (searches && path.arc + t >= path.next) {
 		t = max(path.next - path.arc, 0.0);
 		collided = false;
 	}
-	if (searches && empty)
-		path.sun *= exp(vec3(extinction) * clamp(path.spans.x - path.arc, 0.0, t));
 	path.place += path.direction * t;
 	path.arc += t;
 	float height = path_height(path.place) - cloud_layer.x;

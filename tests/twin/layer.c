@@ -66,7 +66,7 @@ static void fill_block(struct uniform_layer *layer)
 	block->cloud_layer[1] = (float)layer->is.thickness_m * 1.25f;
 	block->cloud_layer[2] = 10000;
 	block->cloud_layer[3] = 1;
-	block->ground_patch[0] = 1;
+	block->ground_patch[0] = block->ground_patch[3] = 1;
 	block->ground_mean_albedo[3] = 10000;
 	block->aerosol[3] = block->rayleigh[3] = 1;
 	block->image_size[0] = block->image_size[1] = SIDE;

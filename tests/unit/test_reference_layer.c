@@ -80,7 +80,7 @@ static void furnace_is_white(void **state)
 		struct uniform_layer layer;
 		layer_init(&layer, &is);
 		for (int above = 0; above < 2; above++) {
-			const struct layer_seen seen = layer_see(&layer, above, 0.6, 1, 40000, THREADS);
+			const struct layer_seen seen = layer_see(&layer, above, 0.6, 1, 60000, THREADS);
 			for (int band = 0; band < 3; band++) {
 				print_message("%g m, band %d: %.4f +- %.4f\n", is.thickness_m, band, seen.mean[band], seen.error[band]);
 				assert_true(seen.error[band] < 0.005);

@@ -201,6 +201,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	vec3 up = path_up(path.place);
 	float mu_v = clamp(-dot(up, path.direction), 0.002, 1.0);
 	float footprint = path.first ? camera_position.w * t * pow(mu_v, -0.75) : 20.0;
+	bool again = !path.first;
 	path.grounded = path.first ? 2 : max(path.grounded, 1);
 	vec2 detail = vec2(1.0);
 	vec2 there = vec2(path.place) + vec2(camera_position);
@@ -238,7 +239,8 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	vec3 onward = path_turned(up, sqrt(share), sqrt(1.0 - share), 2.0 * PI * around);
 	path.kept_place = path.place + onward * sphere_distance_up(0.0, max(dot(up, onward), 1e-4), base);
 	path.kept_direction = onward;
-	float most = clamp(max(path.share.x, max(path.share.y, path.share.z)), 0.02, 1.0);
+	// Light from the ground to clouds is a small part of what a path shows; on the ground that the camera sees it is most.
+	float most = again ? clamp(max(path.share.x, max(path.share.y, path.share.z)), 0.02, 1.0) : 1.0;
 	path.share *= path_random(path) < most ? 1.0 / most : 0.0;
 	if (mu_out > 1e-3 && path.sun.x + path.sun.y + path.sun.z > 0.0) {
 		path.mode = PATH_SUN;

@@ -1,8 +1,9 @@
-"""Measures how far the slab is from its reference over the scenes beside this file: judge.py PAGE BUILD_DIR. scripts/judge.sh starts the daemon.
+"""Measures how far the slab is from its reference over the scenes beside this file: judge.py PAGE [BUILD_DIR]. scripts/judge.sh starts the daemon.
 
 Each scene is rendered solved, in the paper's shading, by the reference, and by the reference once more with another seed and fewer samples, which
 must differ from it by noise alone. The figures of finished scenes are kept in out/judge, so that a run that was stopped goes on; the page is written
-from all of them. JUDGE_SAMPLES=N takes others than 64 samples, for a quick look.
+from all of them. JUDGE_SAMPLES=N takes others than 64 samples, for a quick look. Without BUILD_DIR nothing is rendered: the page is written
+from what there is.
 """
 import json
 import os
@@ -23,8 +24,16 @@ BIAS_BOUND, RMS_BOUND = 5, 15  # percent
 PIXELS_MIN = 100
 
 
+def scenes():
+    return sorted(SCENES.glob("*.json"))
+
+
+def kept_file(scene):
+    return KEPT / f"{scene.stem}.json"
+
+
 def measure(build, scene):
-    kept = KEPT / f"{scene.stem}.json"
+    kept = kept_file(scene)
     if kept.exists():
         return json.loads(kept.read_text())
     began = time.monotonic()
@@ -101,23 +110,30 @@ def group_of(name):
     return f"{'overcast' if 'overcast' in name else 'broken'}, from {where}"
 
 
+def verdicts(found, name, error, bound):
+    """How many figures keep a bound, break it, and cannot be told from it within three standard errors."""
+    counts = [0, 0, 0]
+    for figures in found:
+        value, doubt = 100 * abs(figures[name]), 300 * figures[error]
+        counts[0 if value + doubt <= bound else 1 if value - doubt > bound else 2] += 1
+    return " / ".join(map(str, counts))
+
+
 def summary(results):
-    """Over cloud pixels: medians of the groups, and how many scenes keep each bound, allowing for three standard errors."""
+    """Over cloud pixels: medians of the groups, and how many scenes keep each bound."""
     rows = []
     for group in sorted({group_of(name) for name in results}):
         members = [f for name, f in results.items() if group_of(name) == group]
         row = [group, str(len(members))]
         for variant in ("solved", "paper"):
             found = [x for x in (of(f, variant, "cloud") for f in members) if x]
-            biased = [abs(x["bias"]) for x in found]
-            spread = [x["noise_corrected_rms"] for x in found]
-            keep_bias = sum(100 * (abs(x["bias"]) - 3 * x["bias_standard_error"]) <= BIAS_BOUND for x in found)
-            keep_rms = sum(100 * (x["noise_corrected_rms"] - 3 * x["noise_corrected_rms_standard_error"]) <= RMS_BOUND for x in found)
-            row += [percent(statistics.median(biased)), percent(statistics.median(spread)), f"{keep_bias} / {keep_rms}"]
+            row += [percent(statistics.median(abs(x["bias"]) for x in found)), verdicts(found, "bias", "bias_standard_error", BIAS_BOUND)]
+            row += [percent(statistics.median(x["noise_corrected_rms"] for x in found))]
+            row += [verdicts(found, "noise_corrected_rms", "noise_corrected_rms_standard_error", RMS_BOUND)]
         rows.append(row)
     header = ["decks", "scenes"]
     for variant in ("solved", "paper"):
-        header += [f"{variant}: median of bias %", "of rms %", f"within {BIAS_BOUND} % / {RMS_BOUND} %"]
+        header += [f"{variant}: bias %", f"{BIAS_BOUND} %", "rms %", f"{RMS_BOUND} %"]
     return table(header, rows)
 
 
@@ -134,16 +150,16 @@ def page(results):
     spent = sum(figures["seconds"] for figures in results.values())
     text = (pathlib.Path(__file__).parent / "page.md").read_text()
     text = text.replace("@SIZE@", f"{WIDTH} x {HEIGHT}").replace("@SAMPLES@", str(SAMPLES)).replace("@AGAIN@", str(SAMPLES_AGAIN))
-    text = text.replace("@MINUTES@", f"{spent / 60:.0f}").replace("@COUNT@", str(len(results)))
+    text = text.replace("@MINUTES@", f"{spent / 60:.0f}").replace("@COUNT@", str(len(results))).replace("@ALL@", str(len(scenes())))
     for mark, lines in (("@SUMMARY@", summary), ("@CLOUD@", cloud_table), ("@OTHER@", other_table), ("@CHECK@", check_table)):
         text = text.replace(mark, "\n".join(lines(results)))
     return text
 
 
 def main():
-    target, build = pathlib.Path(sys.argv[1]), sys.argv[2]
+    target, build = pathlib.Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else None
     KEPT.mkdir(parents=True, exist_ok=True)
-    results = {scene.stem: measure(build, scene) for scene in sorted(SCENES.glob("*.json"))}
+    results = {scene.stem: measure(build, scene) for scene in scenes() if build or kept_file(scene).exists()}
     target.write_text(page(results))
 
 

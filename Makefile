@@ -2,6 +2,7 @@
 # make test   installs what tests need, builds, runs all tests
 # make demo   four pictures into out/, with their timings
 # make validate   measures the bounds of optics and radiosity and draws the paper's figures into docs/validation/, some minutes
+# make judge   measures the slab against its reference over 24 scenes and writes docs/judge, some 20 minutes; goes on where it was stopped
 # make gallery   draws the pictures of docs/gallery
 # make install   puts programs, manual and systemd unit below PREFIX (/usr/local), all below DESTDIR; make uninstall takes them away
 # make image     builds the container image and renders a picture with it
@@ -53,7 +54,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel man install uninstall image run test demo gallery validate unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall image run test demo gallery validate judge unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -86,8 +87,14 @@ $(B)/render-bench: $(call obj,renderer/programs/bench.c) $(B)/librenderer.a
 $(B)/stratus-image.so: $(call obj,renderer/image/oiio.cpp) $(B)/pic/renderer/scene.c.o
 	$(CXX) $(LDFLAGS) -shared $^ -o $@ $(call pkg,--libs,OpenImageIO zlib)
 
-$(B)/stratus-validate: $(call obj,$(VALIDATE_SRC)) $(B)/librenderer.a
-	$(CC) $(LDFLAGS) $^ -o $@ $(call pkg,--libs,jansson) $(RENDERER_LIBS)
+# The reference model on the processor: the shader as C++, for tests and validation.
+TWIN_OBJ := $(call obj,tests/twin/layer.c tests/twin/twin.cpp)
+$(B)/tests/twin/twin.cpp.o: tests/twin/twin.cpp $(SHADERS)
+	@mkdir -p $(@D)
+	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -O3 -fsingle-precision-constant -fno-math-errno -fno-trapping-math -c $< -o $@
+
+$(B)/stratus-validate: $(call obj,$(VALIDATE_SRC)) $(TWIN_OBJ) $(B)/librenderer.a
+	$(CC) $(LDFLAGS) $^ -o $@ $(call pkg,--libs,jansson) $(RENDERER_LIBS) -lstdc++
 
 $(B)/%.c.o: %.c
 	@mkdir -p $(@D)
@@ -133,6 +140,8 @@ $(B)/tests/%: tests/unit/%.c $(B)/libserver.a $(B)/librenderer.a
 $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -MF $@.d -fsingle-precision-constant $< $(B)/librenderer.a -o $@ $(LDFLAGS) -lcmocka $(RENDERER_LIBS)
+$(B)/tests/test_reference_layer $(B)/tests/test_reference_twin: $(TWIN_OBJ)
+$(B)/tests/test_reference_layer $(B)/tests/test_reference_twin: RENDERER_LIBS += -lstdc++
 $(B)/tests/test_validate_bounds: $(call obj,tests/validate/bounds.c)
 $(B)/tests/test_deck: $(call obj,tests/validate/deck.c)
 $(B)/tests/test_exchange: $(call obj,tests/validate/squares.c)
@@ -199,6 +208,12 @@ validate: packages
 	@scripts/packages.sh $(VALIDATE_PACKAGES)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(B)/stratus-validate && $(MAKE) --no-print-directory kernel
 	@scripts/validate.sh $(B)
+
+# Figures are kept in out/judge until that is deleted.
+judge: packages
+	@scripts/packages.sh $(GALLERY_PACKAGES) python3
+	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
+	@scripts/judge.sh $(B)
 
 unit: $(UNIT)
 

@@ -5,6 +5,7 @@
 #include "clients/client.h"
 
 extern const struct command command_render;
+extern const struct command command_compare;
 extern const struct command command_asset;
 extern const struct command command_presets;
 extern const struct command command_health;

@@ -57,7 +57,7 @@ static char *join_url(const struct client *client, const char *path)
 static struct curl_slist *request_headers(const struct client *client, const struct http_request *request)
 {
 	char line[64];
-	struct curl_slist *headers = curl_slist_append(NULL, "Accept: */*");
+	struct curl_slist *headers = curl_slist_append(NULL, request->accept ? request->accept : "Accept: */*");
 	if (request->json) {
 		headers = curl_slist_append(headers, "Content-Type: application/json");
 		headers = curl_slist_append(headers, "Expect:"); /* no round trip before the body */

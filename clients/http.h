@@ -15,6 +15,7 @@ struct http_request {
 	int64_t size;       /* of the upload; negative: not known before */
 	bool remove;        /* DELETE */
 	const char *header; /* one more, whole, or NULL */
+	const char *accept; /* header, whole; NULL: anything */
 };
 
 struct http_response {

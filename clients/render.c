@@ -2,9 +2,9 @@
 #include "clients/commands.h"
 #include "clients/http.h"
 #include "clients/output_file.h"
-#include "clients/preset_list.h"
 #include "clients/problem.h"
 #include "clients/scene_edit.h"
+#include "clients/scene_source.h"
 #include "clients/timing.h"
 
 #include <stdio.h>
@@ -13,16 +13,13 @@
 #include <unistd.h>
 
 struct render_options {
-	const char *scene;  /* file, "-", or NULL */
-	const char *preset; /* or NULL */
+	struct scene_source source;
 	const char *output;
-	const char **sets; /* assignments in the order given; points into argv */
-	int set_count;
 };
 
 enum { PRESET = 'p', SET = 's' };
 
-/* Negative: go on; else the exit status. options->sets has room for argc texts. */
+/* Negative: go on; else the exit status. options->source.sets has room for argc texts. */
 static int read_options(struct client *client, struct render_options *options, int argc, char **argv)
 {
 	static const struct option table[] = {{"preset", required_argument, NULL, PRESET},
@@ -32,9 +29,9 @@ static int read_options(struct client *client, struct render_options *options, i
 					      {0}};
 	for (int option; (option = getopt_long(argc, argv, "o:" CLIENT_SHORT_OPTIONS, table, NULL)) != -1;) {
 		if (option == PRESET) {
-			options->preset = optarg;
+			options->source.preset = optarg;
 		} else if (option == SET) {
-			options->sets[options->set_count++] = optarg;
+			options->source.sets[options->source.set_count++] = optarg;
 		} else if (option == 'o') {
 			options->output = optarg;
 		} else {
@@ -43,8 +40,8 @@ static int read_options(struct client *client, struct render_options *options, i
 				return end;
 		}
 	}
-	options->scene = argv[optind];
-	if (argc - optind > 1 || (options->scene && options->preset))
+	options->source.file = argv[optind];
+	if (argc - optind > 1 || (options->source.file && options->source.preset))
 		client_error("render takes one scene: a file, - or a preset");
 	else if (!options->output)
 		client_error("render wants -o FILE, or -o - for standard output");
@@ -55,41 +52,15 @@ static int read_options(struct client *client, struct render_options *options, i
 	return CLIENT_USAGE;
 }
 
-static int take_preset(const struct client *client, const char *name, json_t **scene)
-{
-	json_t *presets;
-	int status = preset_list_fetch(client, &presets);
-	if (status == CLIENT_OK) {
-		*scene = json_incref(preset_list_find(presets, name));
-		status = *scene ? CLIENT_OK : CLIENT_USAGE;
-	}
-	json_decref(presets);
-	return status;
-}
-
 /* The request's body, malloc'd into *body. */
 static int compose_scene(const struct client *client, const struct render_options *options, char **body)
 {
-	json_t *scene = NULL;
-	int status = CLIENT_USAGE;
-	if (options->preset) {
-		status = take_preset(client, options->preset, &scene);
-		if (status != CLIENT_OK)
-			goto cleanup;
-		status = CLIENT_USAGE;
-	} else {
-		scene = options->scene ? scene_read(options->scene) : json_object();
-		if (!scene)
-			goto cleanup;
-	}
-	for (int i = 0; i < options->set_count; i++)
-		if (!scene_set(scene, options->sets[i]))
-			goto cleanup;
-	if (scene_set_format(scene, options->output) && (*body = json_dumps(scene, JSON_COMPACT)))
-		status = CLIENT_OK;
-	else
+	json_t *scene;
+	int status = scene_source_load(client, &options->source, &scene);
+	if (status == CLIENT_OK && !(scene_set_format(scene, options->output) && (*body = json_dumps(scene, JSON_COMPACT)))) {
 		client_error("out of memory");
-cleanup:
+		status = CLIENT_USAGE;
+	}
 	json_decref(scene);
 	return status;
 }
@@ -116,11 +87,12 @@ static int save_answer(const struct client *client, const char *output, const st
 
 static int run_render(struct client *client, int argc, char **argv)
 {
-	struct render_options options = {.sets = calloc((size_t)argc, sizeof *options.sets)};
+	const char **sets = calloc((size_t)argc, sizeof *sets);
+	struct render_options options = {.source.sets = sets};
 	struct http_response response = {0};
 	char *body = NULL;
 	int status = CLIENT_USAGE;
-	if (!options.sets)
+	if (!sets)
 		goto cleanup;
 	status = read_options(client, &options, argc, argv);
 	if (status >= 0)
@@ -133,7 +105,7 @@ static int run_render(struct client *client, int argc, char **argv)
 cleanup:
 	http_response_finish(&response);
 	free(body);
-	free(options.sets);
+	free(sets);
 	return status;
 }
 

@@ -57,14 +57,14 @@ bool scene_set(json_t *scene, const char *assignment)
 	char *equals = copy ? strchr(copy, '=') : NULL;
 	bool done = false;
 	if (!equals || equals == copy || copy[0] == '.' || equals[-1] == '.') {
-		client_error("--set wants member=value, not \"%s\"", assignment);
+		client_error("member=value is wanted, not \"%s\"", assignment);
 		goto cleanup;
 	}
 	*equals = '\0';
 	json_t *object = descend(scene, &path);
 	done = object && json_object_set_new(object, path, parse_value(equals + 1)) == 0;
 	if (!done)
-		client_error("--set %s: a value that is no object stands in the way, or the text is not UTF-8", assignment);
+		client_error("%s: a value that is no object stands in the way, or the text is not UTF-8", assignment);
 cleanup:
 	free(copy);
 	return done;

@@ -7,6 +7,7 @@
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
 #include "renderer/stages/illuminance.h"
+#include "renderer/stages/reference.h"
 #include "renderer/stages/sun_cover.h"
 #include "renderer/stages/sea.h"
 
@@ -26,6 +27,7 @@ struct renderer {
 	struct field_stage field;
 	struct radiosity_stage radiosity;
 	struct view_stage view;
+	struct reference_stage reference;
 	struct illuminance_stage illuminance;
 	struct sun_cover_stage sun_cover;
 	struct sea_stage sea;
@@ -40,6 +42,7 @@ static bool compile_stages(struct renderer *renderer, const struct pass_compiler
 {
 	ground_stage_init(&renderer->ground, compiler);
 	sea_stage_init(&renderer->sea, compiler);
+	reference_stage_init(&renderer->reference, compiler);
 	illuminance_stage_init(&renderer->illuminance, compiler);
 	sun_cover_stage_init(&renderer->sun_cover, compiler);
 	return sky_stage_init(&renderer->sky, compiler) && field_stage_init(&renderer->field, compiler) &&
@@ -51,6 +54,7 @@ static void finish_stages(struct renderer *renderer)
 	sun_cover_stage_finish(&renderer->sun_cover);
 	illuminance_stage_finish(&renderer->illuminance);
 	sea_stage_finish(&renderer->sea);
+	reference_stage_finish(&renderer->reference);
 	view_stage_finish(&renderer->view);
 	radiosity_stage_finish(&renderer->radiosity);
 	field_stage_finish(&renderer->field);
@@ -173,12 +177,20 @@ size_t renderer_cache_bytes(const struct renderer *renderer, enum stage stage)
 
 /* --- one frame -------------------------------------------------------------------------------------------------------------------- */
 
+/* What a reference keeps from one call to the next. */
+struct render_pending {
+	struct reference_work *work;
+	struct stage_timing spent[STAGE_COUNT];
+};
+
 /* Work of one call of renderer_render. */
 struct job {
 	struct renderer *renderer;
 	const struct scene *scene;
-	renderer_cancelled *cancelled;
+	renderer_cancelled *cancelled, *paused;
 	void *cancel_context;
+	struct render_pending **pending;
+	bool unfinished; /* the rest is for another call */
 	struct frame *frame;
 
 	struct ground_maps ground;
@@ -348,6 +360,46 @@ static bool run_sea(struct job *job, struct view_inputs *inputs)
 	return inputs->sea_sky;
 }
 
+/* The clear sky as a path sees it that ends at some height. Leaves the block as it was. */
+static const struct texture *sky_from(struct job *job, double height)
+{
+	struct stage_context *context = &job->renderer->context;
+	const struct scene_block kept = context->block;
+	struct scene scene = *job->scene;
+	struct sky_tables sky;
+	double albedo[3];
+	mean_albedo(job, albedo);
+	scene.camera.position_m[2] = height;
+	context->block.camera_position[2] = (float)height;
+	const bool ok = sky_stage_run(&job->renderer->sky, context, &scene, albedo, &sky);
+	context->block = kept;
+	stage_upload_block(context);
+	return ok ? sky.total : NULL;
+}
+
+/* Cancelled or not: what there is is a picture from here on. Without clouds the view stage's picture is the reference too. */
+static bool run_reference(struct job *job, const struct view_inputs *view)
+{
+	const struct scene *scene = job->scene;
+	struct reference_result result;
+	const struct reference_inputs inputs = {.view = view,
+						.sky_at_layer = sky_from(job, scene->clouds.base_m + scene->clouds.thickness_m),
+						.sky_at_ground = sky_from(job, 0.1)};
+	const struct reference_watch watch = {job->cancelled, job->paused, job->cancel_context};
+	struct render_pending *pending = *job->pending;
+	if (!inputs.sky_at_layer || !inputs.sky_at_ground || !pending ||
+	    !reference_stage_run(&job->renderer->reference, &job->renderer->context, scene, &inputs, job->frame->layer,
+				 job->frame->layer_count, &watch, &pending->work, job->pictures, &result)) {
+		job->unfinished = pending && pending->work && inputs.sky_at_layer && inputs.sky_at_ground;
+		return false;
+	}
+	job->frame->samples = result.samples;
+	job->frame->partial = result.stopped;
+	if (result.stopped)
+		job->cancelled = NULL;
+	return true;
+}
+
 static bool run_view(struct job *job)
 {
 	struct renderer *renderer = job->renderer;
@@ -374,8 +426,12 @@ static bool run_view(struct job *job)
 	frame->layer_count = list_layers(job->scene, frame->layer);
 	if (job->scene->ground.type == GROUND_SEA && !run_sea(job, &inputs))
 		return false;
-	if (!view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
-			    job->cancel_context, job->pictures))
+	const bool reference = job->scene->model.name == MODEL_REFERENCE && job->clouds;
+	if (job->scene->model.name == MODEL_REFERENCE)
+		frame->samples = job->scene->model.samples;
+	if (reference ? !run_reference(job, &inputs)
+		      : !view_stage_run(&renderer->view, context, job->scene, &inputs, frame->layer, frame->layer_count, job->cancelled,
+					job->cancel_context, job->pictures))
 		return false;
 	if (output->format != IMAGE_PNG)
 		return true;
@@ -430,12 +486,43 @@ static bool on_processor(enum stage stage)
 	return stage == STAGE_OPTICS || stage == STAGE_READBACK;
 }
 
+/* What went on before, in the same picture. */
+static void add_spent(struct job *job)
+{
+	const struct render_pending *pending = *job->pending;
+	for (int i = 0; pending && i < STAGE_COUNT; i++) {
+		job->frame->timing[i].milliseconds += pending->spent[i].milliseconds;
+		job->frame->timing[i].reused &= pending->spent[i].reused;
+	}
+}
+
+/* Is there a picture already, that is wanted even when it is cancelled? */
+static bool has_samples(const struct job *job)
+{
+	const struct render_pending *pending = *job->pending;
+	return pending && pending->work && job->scene->model.partial && reference_work_samples(pending->work) > 0;
+}
+
+static bool is_cancelled(const struct job *job)
+{
+	return job->cancelled && !has_samples(job) && job->cancelled(job->cancel_context);
+}
+
+static enum render_result result_of_failure(const struct job *job)
+{
+	if (job->unfinished)
+		return RENDER_UNFINISHED;
+	if (job->cancelled && job->cancelled(job->cancel_context))
+		return RENDER_CANCELLED;
+	return gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+}
+
 static enum render_result run_stages(struct job *job)
 {
 	struct renderer *renderer = job->renderer;
 	for (int i = 0; i < STAGE_COUNT; i++) {
 		struct stage_timing *timing = &job->frame->timing[i];
-		if (job->cancelled && job->cancelled(job->cancel_context))
+		if (is_cancelled(job))
 			return RENDER_CANCELLED;
 		if (i == STAGE_READBACK)
 			glFinish();
@@ -448,9 +535,7 @@ static enum render_result run_stages(struct job *job)
 		timing->milliseconds = clock_milliseconds() - begin;
 		timing->reused = renderer->context.reused;
 		if (!ok)
-			return job->cancelled && job->cancelled(job->cancel_context) ? RENDER_CANCELLED
-			       : gl_lost()                                           ? RENDER_FAILED
-										     : RENDER_OUT_OF_MEMORY;
+			return result_of_failure(job);
 		if (gl_failed(stage_names[i]))
 			return gl_failed_for_memory() ? RENDER_OUT_OF_MEMORY : RENDER_FAILED;
 	}
@@ -460,14 +545,47 @@ static enum render_result run_stages(struct job *job)
 	return RENDER_OK;
 }
 
+static void drop_pending(struct render_pending **pending)
+{
+	if (*pending)
+		reference_work_destroy((*pending)->work);
+	free(*pending);
+	*pending = NULL;
+}
+
+/* Keeps what a picture that goes on took so far; frees what another one left. */
+static void settle_pending(struct job *job, enum render_result result)
+{
+	if (result == RENDER_UNFINISHED)
+		memcpy((*job->pending)->spent, job->frame->timing, sizeof job->frame->timing);
+	else
+		drop_pending(job->pending);
+}
+
 enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
 				   struct frame *frame)
 {
+	struct render_pending *pending = NULL;
+	return renderer_render_some(renderer, scene, cancelled, NULL, context, &pending, frame);
+}
+
+enum render_result renderer_render_some(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled,
+					renderer_cancelled *paused, void *context, struct render_pending **pending, struct frame *frame)
+{
 	*frame = (struct frame){0};
-	struct job job = {.renderer = renderer, .scene = scene, .cancelled = cancelled, .cancel_context = context, .frame = frame};
+	struct job job = {.renderer = renderer,
+			  .scene = scene,
+			  .cancelled = cancelled,
+			  .paused = paused,
+			  .cancel_context = context,
+			  .pending = pending,
+			  .frame = frame};
+	if (!*pending && scene->model.name == MODEL_REFERENCE)
+		*pending = calloc(1, sizeof **pending);
 	if (scene->output.width > renderer->info.max_texture_size || scene->output.height > renderer->info.max_texture_size) {
 		log_error("renderer: %d x %d is more than this device's %d", scene->output.width, scene->output.height,
 			  renderer->info.max_texture_size);
+		drop_pending(pending);
 		return RENDER_OUT_OF_MEMORY;
 	}
 	cache_begin_frame(renderer->context.cache);
@@ -480,6 +598,8 @@ enum render_result renderer_render(struct renderer *renderer, const struct scene
 	renderer->context.block.cloud_layer[3] = scene->clouds.type != CLOUD_NONE && scene->clouds.thickness_m > 0;
 
 	const enum render_result result = run_stages(&job);
+	add_spent(&job);
+	settle_pending(&job, result);
 	frame->radiosity_passes = job.light.passes;
 	frame->radiosity_residual = job.light.residual;
 	memcpy(frame->radiosity_residuals, job.light.residuals, sizeof frame->radiosity_residuals);

@@ -58,6 +58,9 @@ struct frame {
 	void *pixels; /* malloc'd */
 	size_t bytes;
 
+	int samples;  /* light paths behind every pixel, at least; 0: another model than the reference */
+	bool partial; /* fewer than were asked for, because the request was cancelled */
+
 	struct stage_timing timing[STAGE_COUNT];
 	int radiosity_passes;      /* 0 when not run */
 	double radiosity_residual; /* light on its way when the exchange stopped, over what the ground receives; 0 when not run */
@@ -83,12 +86,22 @@ size_t renderer_cache_bytes(const struct renderer *renderer, enum stage stage);
 /* Asked between passes by renderer_render: true stops the work. */
 typedef bool renderer_cancelled(void *context);
 
-enum render_result { RENDER_OK, RENDER_CANCELLED, RENDER_OUT_OF_MEMORY, RENDER_FAILED };
+enum render_result { RENDER_OK, RENDER_UNFINISHED, RENDER_CANCELLED, RENDER_OUT_OF_MEMORY, RENDER_FAILED };
 
 /* Renders a valid scene; a map that it names must be there. cancelled may be NULL. On RENDER_OK the caller owns frame->pixels
- * (frame_finish); else the frame is zeroed and one log line says why. */
+ * (frame_finish); else the frame is zeroed and one log line says why. A scene of MODEL_REFERENCE with model.partial that is cancelled after
+ * its first samples is RENDER_OK, frame->partial. */
 enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
 				   struct frame *frame);
+
+/* A picture of MODEL_REFERENCE on its way. */
+struct render_pending;
+
+/* As renderer_render, for who has other pictures to render as well: when `paused` says true, which is asked every 50 ms or so of a
+ * reference, the result is RENDER_UNFINISHED and *pending is set; the same call goes on with it, after whatever others. With any other
+ * result *pending is NULL, as it is at first. */
+enum render_result renderer_render_some(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled,
+					renderer_cancelled *paused, void *context, struct render_pending **pending, struct frame *frame);
 
 /* Directions to look at the sky in: each zenith angle with each azimuth. */
 struct sky_directions {

@@ -15,21 +15,10 @@ const char *const scene_tone_names[] = {"filmic", "linear", NULL};
 const char *const scene_png_compression_names[] = {"fast", "small", NULL};
 const char *const scene_exr_compression_names[] = {"none", "rle", "zip", "piz", "dwaa", NULL};
 const char *const scene_exr_type_names[] = {"auto", "half", "float", NULL};
-const char *const scene_layer_names[] = {"color",
-					 "sun_direct",
-					 "order0",
-					 "order1",
-					 "order2",
-					 "multiple",
-					 "cloud_sky",
-					 "cloud_ground",
-					 "sky",
-					 "ground",
-					 "air",
-					 "transmittance",
-					 "optical_thickness",
-					 "distance",
-					 NULL};
+const char *const scene_layer_names[] = {
+	"color",          "sun_direct", "order0", "order1", "order2",        "multiple",          "cloud_sky",
+	"cloud_ground",   "sky",        "ground", "air",    "transmittance", "optical_thickness", "distance",
+	"standard_error", NULL};
 
 const char *const scene_path_names[] = {"sun_direct",   "order0", "order1", "order2", "multiple", "cloud_sky",
 					"cloud_ground", "sky",    "ground", "air",    NULL};
@@ -65,6 +54,8 @@ struct scene scene_default(void)
 	scene.model.shading = SHADING_SOLVED;
 	scene.model.optics = OPTICS_MIE;
 	scene.model.paths = SCENE_PATHS_ALL;
+	scene.model.samples = 64;
+	scene.model.seed = 1;
 	scene.output.width = scene_camera_shape(&scene.camera).width;
 	scene.output.height = scene_camera_shape(&scene.camera).height;
 	scene.output.format = IMAGE_PNG;

@@ -68,6 +68,7 @@ enum layer {
 	LAYER_TRANSMITTANCE,
 	LAYER_OPTICAL_THICKNESS,
 	LAYER_DISTANCE,
+	LAYER_STANDARD_ERROR, /* of LAYER_COLOR; of MODEL_REFERENCE alone */
 	LAYER_COUNT
 };
 
@@ -134,6 +135,11 @@ struct scene_model {
 	enum shading shading;
 	enum optics_model optics;
 	uint32_t paths; /* kinds of light that pictures show: bit set of 1 << (layer - LAYER_SUN_DIRECT), up to LAYER_AIR; never empty */
+	/* Of MODEL_REFERENCE alone: */
+	int samples;           /* light paths per pixel at most, 1..65536 */
+	double time_budget_ms; /* the paths end here at the latest; 0: no such end, ..600000 */
+	uint32_t seed;         /* of its random numbers */
+	bool partial;          /* answer what there is when the request's own time is over, instead of nothing */
 };
 
 /* All of them. */

@@ -63,6 +63,8 @@ static const struct option options[] = {
 	 OPTION_INTEGER, AT(assets_disk_mb), .low = 0, .high = 16777216},
 	{"--assets-mb", "STRATUS_ASSETS_MB", "MB", "memory of pictures as the renderer reads them",
 	 OPTION_INTEGER, AT(assets_mb), .low = 1, .high = 1048576},
+	{"--reference-mpaths", "STRATUS_REFERENCE_MPATHS", "M", "light paths of one picture of the model reference, in millions; more are answered 422",
+	 OPTION_INTEGER, AT(reference_mpaths), .low = 1, .high = 1048576},
 	{"--log-level", "STRATUS_LOG_LEVEL", "LEVEL", "error, warning, info, debug",
 	 OPTION_CHOICE, AT(log_level), .choices = level_names},
 	{"--log-format", "STRATUS_LOG_FORMAT", "FORMAT", "text, json (an object a line)",
@@ -209,6 +211,7 @@ static void set_defaults(struct config *config)
 		.asset_count = 256,
 		.assets_disk_mb = 1024,
 		.assets_mb = 256,
+		.reference_mpaths = 1024,
 		.log_level = LOG_INFO,
 		.log_format = LOG_TEXT,
 	};

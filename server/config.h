@@ -23,6 +23,7 @@ struct config {
 	int asset_count;      /* 0..65536; 0: no uploads */
 	int assets_disk_mb;   /* 0..16777216; likewise */
 	int assets_mb;        /* 1..1048576; decoded, in memory */
+	int reference_mpaths; /* 1..1048576; millions of light paths of one picture by the reference */
 	int log_level;        /* enum log_level */
 	int log_format;       /* enum log_format */
 

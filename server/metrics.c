@@ -12,9 +12,9 @@
 #include <time.h>
 #include <unistd.h>
 
-static const char *const route_names[ROUTE_COUNT] = {"/v1/render", "/v1/optics",      "/v1/slab",    "/v1/sky", "/v1/sun",
-						     "/v1/assets", "/v1/assets/NAME", "/v1/presets", "/",       "/openapi.yaml",
-						     "/healthz",   "/readyz",         "/metrics",    "other"};
+static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/compare", "/v1/optics",      "/v1/slab",    "/v1/sky",
+						     "/v1/sun",       "/v1/assets",  "/v1/assets/NAME", "/v1/presets", "/",
+						     "/openapi.yaml", "/healthz",    "/readyz",         "/metrics",    "other"};
 static const char *const rejection_names[REJECTION_COUNT] = {"full", "starting", "shutting_down"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
 static const char *const source_names[DROPLET_SOURCE_COUNT] = {

@@ -11,6 +11,7 @@
 
 enum metrics_route {
 	ROUTE_RENDER,
+	ROUTE_COMPARE,
 	ROUTE_OPTICS,
 	ROUTE_SLAB,
 	ROUTE_SKY,

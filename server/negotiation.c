@@ -10,7 +10,7 @@ const char *const image_content_types[IMAGE_FORMAT_COUNT] = {[IMAGE_PNG] = "imag
 /* How an Accept header values one type: by the most specific range that matches. */
 struct preference {
 	double quality; /* 0..1; 0 also when nothing matches */
-	int precision;  /* 0: not matched, 1: any type, 2: image/any, 3: named */
+	int precision;  /* 0: not matched, 1: any type, 2: image/any and the like, 3: named */
 };
 
 static const char *skip_space(const char *c)
@@ -37,7 +37,7 @@ static int match_precision(const char *range, size_t length, const char *type)
 {
 	if (length == strlen(type) && strncasecmp(range, type, length) == 0)
 		return 3;
-	if (length == 7 && strncasecmp(range, "image/*", 7) == 0)
+	if (length >= 3 && strncmp(range + length - 2, "/*", 2) == 0 && strncasecmp(range, type, length - 1) == 0)
 		return 2;
 	return length == 3 && strncmp(range, "*/*", 3) == 0 ? 1 : 0;
 }
@@ -70,6 +70,24 @@ bool negotiation_choose(const char *accept, enum image_format wanted, enum image
 	if (overrides)
 		*chosen = other;
 	return overrides || ours.quality > 0;
+}
+
+int negotiation_choose_type(const char *accept, const char *const *types)
+{
+	struct preference best = {0, 0};
+	int chosen = -1;
+	if (!accept || !*skip_space(accept))
+		return 0;
+	for (int i = 0; types[i]; i++) {
+		const struct preference own = preference_for(accept, types[i]);
+		const bool better = own.quality > best.quality ||
+				    (own.quality > 0 && own.quality == best.quality && own.precision == 3 && best.precision < 3);
+		if (better) {
+			best = own;
+			chosen = i;
+		}
+	}
+	return chosen;
 }
 
 bool negotiation_is_json(const char *content_type)

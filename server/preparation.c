@@ -61,6 +61,12 @@ bool preparation_push(struct preparation *preparation, struct render_job *job)
 	return false;
 }
 
+void preparation_pass(struct preparation *preparation, struct render_job *job)
+{
+	const bool ready = !scene_has_clouds(job->scene) || find(preparation, job);
+	render_queue_pass(ready ? preparation->queue : preparation->waiting, job);
+}
+
 /* --- the thread ------------------------------------------------------------------------------------------------------------------- */
 
 /* Waits while as much is held as may be, by jobs that will give it back. false when the job is over. */

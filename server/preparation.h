@@ -22,6 +22,9 @@ void preparation_destroy(struct preparation *preparation);
  * Any thread. */
 bool preparation_push(struct preparation *preparation, struct render_job *job);
 
+/* Likewise for a job of a request that has been admitted with another: takes it whatever waits already. Any thread. */
+void preparation_pass(struct preparation *preparation, struct render_job *job);
+
 /* The renderer needs the job's tables no longer. Once or more for every job; any thread. */
 void preparation_release(struct preparation *preparation, struct render_job *job);
 

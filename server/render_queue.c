@@ -117,6 +117,16 @@ struct render_job *render_queue_pop_wanted(struct render_queue *queue, render_jo
 	return job;
 }
 
+bool render_queue_has(struct render_queue *queue, render_job_wanted *wanted, void *context)
+{
+	pthread_mutex_lock(&queue->mutex);
+	struct render_job *job = queue->first;
+	while (job && !wanted(job, context))
+		job = job->next;
+	pthread_mutex_unlock(&queue->mutex);
+	return job;
+}
+
 void render_queue_close(struct render_queue *queue)
 {
 	pthread_mutex_lock(&queue->mutex);

@@ -33,6 +33,8 @@ struct render_job {
 	double prepared_ms;
 	bool prepared; /* computed or read from disk; else from memory */
 
+	struct render_pending
+		*pending; /* of a reference on its way, that goes back to the queue to let others pass; the render thread's own */
 	enum render_outcome outcome;
 	double waited_ms; /* in queues */
 	struct frame frame;
@@ -61,6 +63,9 @@ struct render_job *render_queue_pop(struct render_queue *queue);
 /* The first job that is wanted, or NULL; never waits. `wanted` must not use the queue. */
 typedef bool render_job_wanted(struct render_job *job, void *context);
 struct render_job *render_queue_pop_wanted(struct render_queue *queue, render_job_wanted *wanted, void *context);
+
+/* Is there a job that is wanted? Likewise. */
+bool render_queue_has(struct render_queue *queue, render_job_wanted *wanted, void *context);
 
 void render_queue_close(struct render_queue *queue);
 

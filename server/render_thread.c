@@ -22,21 +22,53 @@ struct render_thread {
 	struct renderer *renderer;
 	_Atomic int state; /* enum render_thread_state; kernel, droplets and renderer are set before it says READY */
 	_Atomic double busy_since_ms, typical_ms;
-	int failures; /* on end */
+	int failures;     /* on end */
+	bool has_pending; /* a reference in the queue is on its way */
 };
+
+/* --- jobs -------------------------------------------------------------------------------------------------------------------------- */
+
+/* Who asks is alive: what may take minutes, a reference, is no hang as long as it does. */
+struct running_job {
+	struct render_thread *thread;
+	struct render_job *job;
+	double pause_ms; /* from when on others may pass */
+};
+
+/* A reference lets others pass after so long: about a picture's time each. */
+#define PASSING_MS 250.0
 
 static bool is_cancelled(void *context)
 {
-	return render_job_is_over(context);
+	const struct running_job *running = context;
+	running->thread->busy_since_ms = clock_now_ms();
+	return render_job_is_over(running->job);
 }
 
-static enum render_outcome render(struct render_thread *thread, struct render_job *job)
+/* While a reference is on its way others of its kind wait for its end, since each takes memory; but for those that end here without a
+ * picture. */
+static bool may_pass(struct render_job *job, void *context)
 {
-	if (render_job_is_over(job))
-		return job->outcome;
-	enum render_result result =
-		job->directions ? renderer_sky_light(thread->renderer, job->scene, job->directions, is_cancelled, job, &job->light)
-				: renderer_render(thread->renderer, job->scene, is_cancelled, job, &job->frame);
+	(void)context;
+	return job->pending || job->directions || job->scene->model.name != MODEL_REFERENCE || render_job_is_over(job);
+}
+
+static bool is_paused(void *context)
+{
+	const struct running_job *running = context;
+	return clock_now_ms() >= running->pause_ms && render_queue_has(running->thread->queue, may_pass, NULL);
+}
+
+static enum render_result ask_renderer(struct render_thread *thread, struct render_job *job)
+{
+	struct running_job running = {thread, job, clock_now_ms() + PASSING_MS};
+	if (job->directions)
+		return renderer_sky_light(thread->renderer, job->scene, job->directions, is_cancelled, &running, &job->light);
+	return renderer_render_some(thread->renderer, job->scene, is_cancelled, is_paused, &running, &job->pending, &job->frame);
+}
+
+static enum render_outcome outcome_of(struct render_thread *thread, struct render_job *job, enum render_result result)
+{
 	if (result == RENDER_CANCELLED)
 		return job->outcome;
 	/* A scene that does not fit says nothing about the next one: only a failing device turns the daemon's health. */
@@ -50,17 +82,42 @@ static enum render_outcome render(struct render_thread *thread, struct render_jo
 	return result == RENDER_OK ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
 }
 
+/* What was begun is given back to the renderer even when it is over. Returns whether the job has ended. */
+static bool run_job(struct render_thread *thread, struct render_job *job)
+{
+	if (!job->pending && render_job_is_over(job))
+		return true;
+	const enum render_result result = ask_renderer(thread, job);
+	if (result == RENDER_UNFINISHED)
+		return false;
+	job->outcome = outcome_of(thread, job, result);
+	return true;
+}
+
+/* The next job; while a reference is on its way, which stands in the queue too, one that may pass it, or that itself. */
+static struct render_job *next_job(struct render_thread *thread)
+{
+	struct render_job *job = thread->has_pending ? render_queue_pop_wanted(thread->queue, may_pass, NULL) : NULL;
+	return job ? job : render_queue_pop(thread->queue);
+}
+
 static void run_jobs(struct render_thread *thread)
 {
-	for (struct render_job *job; (job = render_queue_pop(thread->queue));) {
-		double start = clock_now_ms();
+	for (struct render_job *job; (job = next_job(thread));) {
+		const double start = clock_now_ms();
+		const bool was_pending = job->pending;
 		thread->busy_since_ms = start;
-		job->outcome = render(thread, job);
-		double took = clock_now_ms() - start;
-		if (job->outcome == RENDER_OUTCOME_OK)
+		const bool ended = run_job(thread, job);
+		const double took = clock_now_ms() - start;
+		if (ended && job->outcome == RENDER_OUTCOME_OK && job->scene->model.name == MODEL_SLAB)
 			thread->typical_ms = thread->typical_ms > 0 ? 0.7 * thread->typical_ms + 0.3 * took : took;
 		thread->busy_since_ms = 0;
-		job->finished(job);
+		if (!ended || was_pending)
+			thread->has_pending = !ended;
+		if (ended)
+			job->finished(job);
+		else
+			render_queue_pass(thread->queue, job);
 	}
 }
 

@@ -29,7 +29,7 @@ struct droplet_store *render_thread_droplets(const struct render_thread *thread)
 /* Bytes of what a stage remembers on the GPU. Any thread, once the state has been RENDER_THREAD_READY and until render_thread_destroy. */
 size_t render_thread_cache_bytes(const struct render_thread *thread, enum stage stage);
 
-/* Milliseconds the running job has taken so far, 0 when idle. Any thread. */
+/* Milliseconds since the running job began or last asked whether it is over, 0 when idle. Any thread. */
 double render_thread_busy_ms(const struct render_thread *thread);
 
 /* A typical job's milliseconds lately, 0 before the first. Any thread. */

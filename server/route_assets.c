@@ -12,6 +12,7 @@
 #include "server/negotiation.h"
 #include "server/query.h"
 #include "server/response.h"
+#include "server/scene_query.h"
 #include "server/service.h"
 
 #include <stddef.h>
@@ -120,6 +121,8 @@ static void add_to_list(void *context, const char *name, const struct asset_file
 
 enum MHD_Result route_assets(struct request *request)
 {
+	if (!scene_query_refuse(request->query, &request->problem))
+		return response_send_problem(request);
 	const struct asset_limits *limits = asset_store_limits(request->service->assets);
 	json_t *list = json_array();
 	if (!asset_store_list(request->service->assets, add_to_list, list)) {
@@ -201,6 +204,7 @@ enum MHD_Result route_asset_begin(struct request *request)
 						 SCENE_NAME_MAX - 1);
 	if (request_header(request, "Content-Range")) /* RFC 9110, 14.5 */
 		return response_send_new_problem(request, PROBLEM_BAD_REQUEST, "An asset is sent whole, without a Content-Range.");
+	scene_query_refuse(request->query, &request->problem);
 	work->deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);
@@ -299,5 +303,7 @@ enum MHD_Result route_asset(struct request *request)
 		return finish_put(request);
 	if (!read_name(request, name))
 		return send_result(request, ASSET_MISSING);
+	if (!scene_query_refuse(request->query, &request->problem))
+		return response_send_problem(request);
 	return strcmp(request->method, MHD_HTTP_METHOD_DELETE) == 0 ? delete (request, name) : send_file(request, name);
 }

@@ -5,8 +5,8 @@
 #include "server/routes.h"
 
 #include "renderer/log.h"
+#include "server/call.h"
 #include "server/clock.h"
-#include "server/entity_tag.h"
 #include "server/number_text.h"
 #include "server/query.h"
 #include "server/response.h"
@@ -19,8 +19,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum optics_outcome { OPTICS_OK, OPTICS_EXPIRED, OPTICS_ABANDONED, OPTICS_FAILED };
-
 struct optics_work {
 	struct work work;
 	struct request *request;
@@ -29,7 +27,7 @@ struct optics_work {
 	bool zenith_given, refused;
 	char tag[ENTITY_TAG_SIZE];
 	double deadline_ms, queued_ms;
-	enum optics_outcome outcome;
+	enum call_outcome outcome;
 	char *answer;
 };
 
@@ -137,13 +135,6 @@ static json_t *optics_to_json(const struct optics *optics, const struct paper_fi
 
 /* --- computing, on a worker ------------------------------------------------------------------------------------------------------ */
 
-static enum optics_outcome reason_to_stop(const struct optics_work *work)
-{
-	if (clock_now_ms() >= work->deadline_ms)
-		return OPTICS_EXPIRED;
-	return work->request->service->giving_up || request_is_abandoned(work->request) ? OPTICS_ABANDONED : OPTICS_OK;
-}
-
 static char *text_of(json_t *root)
 {
 	char *text = root ? json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9)) : NULL;
@@ -161,14 +152,14 @@ static void compute(struct optics_work *work)
 	enum droplet_source source, fit_source;
 	const double start = clock_now_ms();
 	const struct droplet_tables *tables = droplet_store_get(store, &scene->dsd, scene->model.optics, &source);
-	work->outcome = tables ? reason_to_stop(work) : OPTICS_FAILED;
-	bool good = work->outcome == OPTICS_OK && droplet_store_get_fit(store, &scene->dsd, scene->model.optics, &fit, &fit_source);
+	work->outcome = tables ? call_reason_to_stop(work->request, work->deadline_ms) : CALL_FAILED;
+	bool good = work->outcome == CALL_OK && droplet_store_get_fit(store, &scene->dsd, scene->model.optics, &fit, &fit_source);
 	timings_set(timings, TIMING_OPTICS, clock_now_ms() - start);
 	timings->entry[TIMING_OPTICS].reused = good && source == DROPLETS_FROM_MEMORY && fit_source == DROPLETS_FROM_MEMORY;
 	if (good)
 		work->answer = text_of(optics_to_json(tables->optics, &fit, work->sun_zenith_deg));
-	if (work->outcome == OPTICS_OK)
-		work->outcome = work->answer ? reason_to_stop(work) : OPTICS_FAILED;
+	if (work->outcome == CALL_OK)
+		work->outcome = work->answer ? call_reason_to_stop(work->request, work->deadline_ms) : CALL_FAILED;
 	if (tables)
 		droplet_store_release(store, tables);
 	service->computing_ms = clock_now_ms() - start;
@@ -178,59 +169,39 @@ static void run(struct work *base)
 {
 	struct optics_work *work = (struct optics_work *)((char *)base - offsetof(struct optics_work, work));
 	timings_set(&work->request->timings, TIMING_QUEUE, clock_now_ms() - work->queued_ms);
-	work->outcome = reason_to_stop(work);
-	if (work->outcome == OPTICS_OK)
+	work->outcome = call_reason_to_stop(work->request, work->deadline_ms);
+	if (work->outcome == CALL_OK)
 		compute(work);
-	if (work->outcome == OPTICS_FAILED)
+	if (work->outcome == CALL_FAILED)
 		log_error("request %s: the optics could not be computed", work->request->id);
 	request_resume(work->request);
 }
 
 /* --- answering, on the HTTP thread ------------------------------------------------------------------------------------------ */
 
-/* The numbers follow from the droplets, the angle, and the program that computes them. */
-static bool set_tag(struct optics_work *work, const struct service *service)
+/* What the numbers follow from, as text; the caller frees. NULL when out of memory. */
+static char *question_of(const struct optics_work *work)
 {
-	struct text tagged = {0};
+	struct text text = {0};
 	const struct scene *scene = &work->input.scene;
-	text_printf(&tagged, "optics|%a|%a|%a|%d|%a|%s", scene->dsd.n0_per_cm3, scene->dsd.gamma, scene->dsd.effective_radius_um,
-		    (int)scene->model.optics, work->sun_zenith_deg, service->pixel_version);
-	const bool good = !tagged.failed;
-	if (good)
-		entity_tag_of(tagged.data, tagged.length, work->tag);
-	text_finish(&tagged);
-	return good;
+	text_printf(&text, "%a|%a|%a|%d|%a", scene->dsd.n0_per_cm3, scene->dsd.gamma, scene->dsd.effective_radius_um,
+		    (int)scene->model.optics, work->sun_zenith_deg);
+	return text_take(&text);
 }
 
 static enum MHD_Result send_optics(struct request *request, unsigned status, struct MHD_Response *response)
 {
 	const struct optics_work *work = request->work;
-	if (status == MHD_HTTP_OK)
-		response_set(response, "Content-Type", "application/json");
-	response_set(response, "ETag", work->tag);
-	response_set(response, "Cache-Control", CACHE_KEEP);
-	return response_send(request, status, response);
+	return call_send_json(request, status, response, work->tag, CACHE_KEEP);
 }
 
 static enum MHD_Result finish(struct request *request)
 {
 	struct optics_work *work = request->work;
-	if (work->refused) {
-		metrics_count_rejection(request->service->metrics, REJECTED_FULL);
-		return response_send_new_problem(request, PROBLEM_COMPUTERS_FULL, "%d such calls are waiting, and no more may.",
-						 request->service->config->queue_length);
-	}
-	switch (work->outcome) {
-	case OPTICS_EXPIRED:
-		return response_send_new_problem(request, PROBLEM_DEADLINE, "The optics were not ready within their deadline.");
-	case OPTICS_ABANDONED:
-		return MHD_NO;
-	case OPTICS_FAILED:
-		return response_send_new_problem(request, PROBLEM_INTERNAL,
-						 "The optics could not be computed. The log has the reason under %s.", request->id);
-	case OPTICS_OK:
-		break;
-	}
+	if (work->refused)
+		return call_refuse_computing(request);
+	if (work->outcome != CALL_OK)
+		return call_send_failure(request, work->outcome, "The answer");
 	struct MHD_Response *response = response_create(request, work->answer, strlen(work->answer));
 	work->answer = NULL;
 	return send_optics(request, MHD_HTTP_OK, response);
@@ -249,12 +220,11 @@ enum MHD_Result route_optics(struct request *request)
 	work->deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);
-	if (!set_tag(work, request->service))
+	enum MHD_Result result;
+	if (!call_tag(request->service, "optics", question_of(work), work->tag))
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
-	if (entity_tag_matches(request_header(request, "If-None-Match"), work->tag))
-		return send_optics(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
-	if (request->is_head)
-		return send_optics(request, MHD_HTTP_OK, response_create_unsized());
+	if (call_answer_at_once(request, work->tag, send_optics, &result))
+		return result;
 	work->queued_ms = clock_now_ms();
 	/* Suspended first: a worker may be done before worker_pool_try returns. */
 	request_suspend(request, finish);

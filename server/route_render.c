@@ -7,11 +7,12 @@
 #include "server/routes.h"
 
 #include "renderer/log.h"
+#include "server/call.h"
 #include "server/clock.h"
-#include "server/entity_tag.h"
 #include "server/json_document.h"
 #include "server/negotiation.h"
 #include "server/query.h"
+#include "server/reference_limits.h"
 #include "server/response.h"
 #include "server/scene_assets.h"
 #include "server/scene_canonical.h"
@@ -20,7 +21,9 @@
 #include "server/scene_rules.h"
 #include "server/service.h"
 
+#include <math.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,6 +37,7 @@ struct render_work {
 	double decoding_since_ms, decode_ms[SCENE_ASSETS_COUNT];
 	char *canonical, *location;
 	char key[DIGEST_SIZE], tag[ENTITY_TAG_SIZE];
+	double deadline_ms;
 	bool refused; /* the queue was full */
 	struct image_buffer image;
 	double encode_ms;
@@ -100,6 +104,7 @@ static void read_scene(struct request *request, struct render_work *work)
 	enum image_format *format = &input->scene.output.format;
 	bool acceptable = negotiation_choose(request_header(request, "Accept"), *format, format);
 	scene_rules_apply(input, &request->problem);
+	reference_limits_check(request->service->config, &input->scene, &request->problem);
 	scene_assets_find(request->service->assets, &input->scene, &work->assets, &request->problem);
 	if (!acceptable)
 		problem_set(&request->problem, PROBLEM_NOT_ACCEPTABLE, "The image would be %s, which the Accept header excludes.",
@@ -109,21 +114,17 @@ static void read_scene(struct request *request, struct render_work *work)
 /* What follows from the scene alone. false when out of memory. */
 static bool describe(struct render_work *work, const struct service *service)
 {
-	struct text tagged = {0}, location = {0};
+	struct text location = {0};
 	char *query = scene_canonical_query(&work->input.scene);
 	work->canonical = scene_canonical(&work->input.scene);
 	scene_canonical_key(&work->input.scene, work->key);
 	text_add(&location, "/v1/render");
 	text_printf(&location, "%s%s", query && *query ? "?" : "", query ? query : "");
 	work->location = text_take(&location);
-	text_printf(&tagged, "%s|%s", work->canonical ? work->canonical : "", service->pixel_version);
-	bool good = query && work->canonical && work->location && !tagged.failed;
+	bool good = query && work->canonical && work->location && call_tag(service, "render", strdup(work->canonical), work->tag);
 	if (work->canonical)
 		digest_of(work->canonical, strlen(work->canonical), work->request->scene);
-	if (good)
-		entity_tag_of(tagged.data, tagged.length, work->tag);
 	free(query);
-	text_finish(&tagged);
 	return good;
 }
 
@@ -134,42 +135,37 @@ static enum MHD_Result send_image(struct request *request, unsigned status, stru
 	const struct render_work *work = request->work;
 	if (status == MHD_HTTP_OK)
 		response_set(response, "Content-Type", image_content_types[work->input.scene.output.format]);
-	response_set(response, "ETag", work->tag);
-	response_set(response, "Vary", "Accept");
 	/* The content of a map may change behind its name. */
 	const bool named = *work->input.scene.clouds.map.name || *work->input.scene.ground.map.name;
-	response_set(response, "Cache-Control", named ? CACHE_ASK : CACHE_KEEP);
+	const bool timed = reference_is_timed(&work->input.scene);
+	if (!timed)
+		response_set(response, "ETag", work->tag);
+	response_set(response, "Vary", "Accept");
+	response_set(response, "Cache-Control", timed ? CACHE_NONE : named ? CACHE_ASK : CACHE_KEEP);
 	response_set(response, "X-Scene-Key", work->key);
 	response_set(response, "Content-Location", work->location);
 	return response_send(request, status, response);
 }
 
+/* How far a reference came. */
+static void set_samples(struct MHD_Response *response, const struct frame *frame)
+{
+	char number[16];
+	snprintf(number, sizeof number, "%d", frame->samples);
+	if (frame->samples > 0)
+		response_set(response, "Stratus-Samples", number);
+	if (frame->partial)
+		response_set(response, "Stratus-Partial", "true");
+}
+
 static enum MHD_Result finish(struct request *request)
 {
 	struct render_work *work = request->work;
-	struct metrics *metrics = request->service->metrics;
-	if (work->refused) {
-		if (request->service->stopping)
-			return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
-		metrics_count_rejection(metrics, REJECTED_FULL);
-		return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "%d renders are waiting, and no more may.",
-						 request->service->config->queue_length);
-	}
+	if (work->refused)
+		return call_refuse_render(request);
 	timings_set(&request->timings, TIMING_QUEUE, work->job.waited_ms);
-	switch (work->job.outcome) {
-	case RENDER_OUTCOME_EXPIRED:
-		return response_send_new_problem(request, PROBLEM_DEADLINE, "The image was not ready within its deadline.");
-	case RENDER_OUTCOME_ABANDONED:
-		return MHD_NO;
-	case RENDER_OUTCOME_NO_MEMORY:
-		return response_send_new_problem(request, PROBLEM_NO_MEMORY,
-						 "The device has no memory for an image of this size and these layers now.");
-	case RENDER_OUTCOME_FAILED:
-		return response_send_new_problem(request, PROBLEM_RENDER_FAILED,
-						 "The image could not be made. The log has the reason under %s.", request->id);
-	case RENDER_OUTCOME_OK:
-		break;
-	}
+	if (work->job.outcome != RENDER_OUTCOME_OK)
+		return call_send_render_failure(request, work->job.outcome, "The image", "an image of this size and these layers");
 	timings_set_frame(&request->timings, &work->job.frame);
 	timings_add_optics(&request->timings, work->job.prepared_ms, work->job.prepared);
 	timings_add(&request->timings, TIMING_FIELD, work->decode_ms[0]);
@@ -177,9 +173,10 @@ static enum MHD_Result finish(struct request *request)
 	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
 	struct MHD_Response *response = response_create(request, (char *)work->image.data, work->image.size);
 	work->image.data = NULL;
+	set_samples(response, &work->job.frame);
 	enum MHD_Result result = send_image(request, MHD_HTTP_OK, response);
-	metrics_count_timings(metrics, &request->timings);
-	metrics_count_picture(metrics, (double)work->job.frame.width * work->job.frame.height * work->job.frame.layer_count);
+	metrics_count_timings(request->service->metrics, &request->timings);
+	metrics_count_picture(request->service->metrics, (double)work->job.frame.width * work->job.frame.height * work->job.frame.layer_count);
 	return result;
 }
 
@@ -188,19 +185,7 @@ static enum MHD_Result finish(struct request *request)
 static bool is_abandoned(struct render_job *job)
 {
 	const struct render_work *work = (const struct render_work *)((char *)job - offsetof(struct render_work, job));
-	return work->request->service->giving_up || request_is_abandoned(work->request);
-}
-
-/* Counted here and not in `finish`, which libmicrohttpd does not call for a connection that it finds closed. */
-static void hand_back(struct render_work *work)
-{
-	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
-						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
-						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
-						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
-	if (work->job.outcome != RENDER_OUTCOME_OK)
-		metrics_count_end(work->request->service->metrics, ends[work->job.outcome]);
-	request_resume(work->request);
+	return call_is_abandoned(work->request);
 }
 
 static void encode(struct work *base)
@@ -210,19 +195,23 @@ static void encode(struct work *base)
 		.scene_json = work->canonical, .request_id = work->request->id, .software = "stratus " RENDERER_VERSION};
 	char error[256] = "";
 	double start = clock_now_ms();
-	if (start >= work->job.deadline_ms) {
+	/* What was cut short for the deadline goes out, even if that passes now. */
+	const double deadline_ms = work->job.frame.partial ? INFINITY : work->deadline_ms;
+	if (work->job.frame.partial && request_is_abandoned(work->request)) {
+		work->job.outcome = RENDER_OUTCOME_ABANDONED;
+	} else if (start >= deadline_ms) {
 		work->job.outcome = RENDER_OUTCOME_EXPIRED;
 	} else if (!work->request->service->images->encode(&work->job.frame, &work->input.scene, &metadata, &work->image, error,
 							   sizeof error)) {
 		log_error("request %s: encoding failed: %s", work->request->id, error);
 		work->job.outcome = RENDER_OUTCOME_FAILED;
-	} else if (clock_now_ms() >= work->job.deadline_ms) {
+	} else if (clock_now_ms() >= deadline_ms) {
 		work->job.outcome = RENDER_OUTCOME_EXPIRED;
 	}
 	work->encode_ms = clock_now_ms() - start;
 	free(work->job.frame.pixels);
 	work->job.frame.pixels = NULL;
-	hand_back(work);
+	call_end_render(work->request, &work->job);
 }
 
 static void on_rendered(struct render_job *job)
@@ -235,7 +224,7 @@ static void on_rendered(struct render_job *job)
 	if (job->outcome == RENDER_OUTCOME_OK)
 		worker_pool_wait(work->request->service->workers, &work->encode);
 	else
-		hand_back(work);
+		call_end_render(work->request, &work->job);
 }
 
 /* --- the way through ------------------------------------------------------------------------------------------------------------ */
@@ -260,7 +249,7 @@ static void decode(struct work *base)
 	work->job.outcome = RENDER_OUTCOME_FAILED;
 	if (render_job_is_over(&work->job) ||
 	    !scene_assets_decode(service->maps, service->images, &work->input.scene, &work->assets, is_over, &work->job, work->decode_ms))
-		hand_back(work);
+		call_end_render(work->request, &work->job);
 	else if (!preparation_push(service->preparation, &work->job))
 		refuse(work);
 }
@@ -270,7 +259,8 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	struct render_work *work = request->work;
 	struct service *service = request->service;
 	work->job.scene = &work->input.scene;
-	work->job.deadline_ms = deadline_ms;
+	work->deadline_ms = deadline_ms;
+	work->job.deadline_ms = reference_stop_ms(&work->input.scene, clock_now_ms(), deadline_ms, 0);
 	work->job.abandoned = is_abandoned;
 	work->job.finished = on_rendered;
 	work->encode.run = encode;
@@ -300,9 +290,8 @@ enum MHD_Result route_render(struct request *request)
 		return response_send_problem(request);
 	if (!describe(work, request->service))
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
-	if (!request->is_post && entity_tag_matches(request_header(request, "If-None-Match"), work->tag))
-		return send_image(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
-	if (request->is_head)
-		return send_image(request, MHD_HTTP_OK, response_create_unsized());
-	return enqueue(request, deadline_ms);
+	enum MHD_Result result;
+	if (reference_is_timed(&work->input.scene) && !request->is_head)
+		return enqueue(request, deadline_ms); /* no two of them need be the same */
+	return call_answer_at_once(request, work->tag, send_image, &result) ? result : enqueue(request, deadline_ms);
 }

@@ -7,8 +7,8 @@
 
 #include "renderer/log.h"
 #include "renderer/optics/optics.h"
+#include "server/call.h"
 #include "server/clock.h"
-#include "server/entity_tag.h"
 #include "server/response.h"
 #include "server/scene_assets.h"
 #include "server/service.h"
@@ -85,60 +85,22 @@ static char *format_answer(const struct sky_work *work)
 
 /* --- answering, on the HTTP thread ------------------------------------------------------------------------------------------ */
 
-/* The numbers follow from the query, the program and the device that runs it. false when out of memory. */
-static bool set_tag(struct sky_work *work, const struct service *service)
-{
-	struct text tagged = {0};
-	char *canonical = sky_query_canonical(&work->query);
-	text_printf(&tagged, "sky|%s|%s", canonical ? canonical : "", service->pixel_version);
-	bool good = canonical && !tagged.failed;
-	if (good)
-		entity_tag_of(tagged.data, tagged.length, work->tag);
-	free(canonical);
-	text_finish(&tagged);
-	return good;
-}
-
 static enum MHD_Result send_light(struct request *request, unsigned status, struct MHD_Response *response)
 {
 	const struct sky_work *work = request->work;
-	if (status == MHD_HTTP_OK)
-		response_set(response, "Content-Type", "application/json");
-	response_set(response, "ETag", work->tag);
 	/* The content of a map may change behind its name. */
-	response_set(response, "Cache-Control", *work->query.input.scene.ground.map.name ? CACHE_ASK : CACHE_KEEP);
-	return response_send(request, status, response);
-}
-
-static enum MHD_Result send_refusal(struct request *request)
-{
-	const struct service *service = request->service;
-	if (service->stopping)
-		return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
-	metrics_count_rejection(service->metrics, REJECTED_FULL);
-	return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "%d renders are waiting, and no more may.",
-					 service->config->queue_length);
+	const bool named = *work->query.input.scene.ground.map.name;
+	return call_send_json(request, status, response, work->tag, named ? CACHE_ASK : CACHE_KEEP);
 }
 
 static enum MHD_Result finish(struct request *request)
 {
 	struct sky_work *work = request->work;
 	if (work->refused)
-		return send_refusal(request);
+		return call_refuse_render(request);
 	timings_set(&request->timings, TIMING_QUEUE, work->job.waited_ms);
-	switch (work->job.outcome) {
-	case RENDER_OUTCOME_EXPIRED:
-		return response_send_new_problem(request, PROBLEM_DEADLINE, "The numbers were not ready within their deadline.");
-	case RENDER_OUTCOME_ABANDONED:
-		return MHD_NO;
-	case RENDER_OUTCOME_NO_MEMORY:
-		return response_send_new_problem(request, PROBLEM_NO_MEMORY, "The device has no memory for so many directions now.");
-	case RENDER_OUTCOME_FAILED:
-		return response_send_new_problem(request, PROBLEM_RENDER_FAILED,
-						 "The sky could not be computed. The log has the reason under %s.", request->id);
-	case RENDER_OUTCOME_OK:
-		break;
-	}
+	if (work->job.outcome != RENDER_OUTCOME_OK)
+		return call_send_render_failure(request, work->job.outcome, "The sky", "so many directions");
 	timings_set(&request->timings, TIMING_SKY, work->job.light.timing.milliseconds);
 	request->timings.entry[TIMING_SKY].reused = work->job.light.timing.reused;
 	timings_set(&request->timings, TIMING_ENCODE, work->write_ms);
@@ -151,20 +113,7 @@ static enum MHD_Result finish(struct request *request)
 
 static bool is_abandoned(struct render_job *job)
 {
-	const struct request *request = work_of(job)->request;
-	return request->service->giving_up || request_is_abandoned(request);
-}
-
-/* Counted here and not in `finish`, which libmicrohttpd does not call for a connection that it finds closed. */
-static void hand_back(struct sky_work *work)
-{
-	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
-						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
-						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
-						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
-	if (work->job.outcome != RENDER_OUTCOME_OK)
-		metrics_count_end(work->request->service->metrics, ends[work->job.outcome]);
-	request_resume(work->request);
+	return call_is_abandoned(work_of(job)->request);
 }
 
 static void write_answer(struct work *base)
@@ -181,7 +130,7 @@ static void write_answer(struct work *base)
 		}
 	}
 	work->write_ms = clock_now_ms() - start;
-	hand_back(work);
+	call_end_render(work->request, &work->job);
 }
 
 static void on_computed(struct render_job *job)
@@ -192,7 +141,7 @@ static void on_computed(struct render_job *job)
 	if (job->outcome == RENDER_OUTCOME_OK)
 		worker_pool_wait(work->request->service->workers, &work->write);
 	else
-		hand_back(work);
+		call_end_render(work->request, job);
 }
 
 /* --- the way through ------------------------------------------------------------------------------------------------------------ */
@@ -242,11 +191,8 @@ enum MHD_Result route_sky(struct request *request)
 	double deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);
-	if (!set_tag(work, request->service))
+	enum MHD_Result result;
+	if (!call_tag(request->service, "sky", sky_query_canonical(&work->query), work->tag))
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
-	if (entity_tag_matches(request_header(request, "If-None-Match"), work->tag))
-		return send_light(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
-	if (request->is_head)
-		return send_light(request, MHD_HTTP_OK, response_create_unsized());
-	return enqueue(request, deadline_ms);
+	return call_answer_at_once(request, work->tag, send_light, &result) ? result : enqueue(request, deadline_ms);
 }

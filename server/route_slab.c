@@ -6,8 +6,8 @@
 #include "server/routes.h"
 
 #include "renderer/log.h"
+#include "server/call.h"
 #include "server/clock.h"
-#include "server/entity_tag.h"
 #include "server/response.h"
 #include "server/service.h"
 #include "server/slab_answer.h"
@@ -17,8 +17,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum slab_outcome { SLAB_OK, SLAB_EXPIRED, SLAB_ABANDONED, SLAB_STOPPED, SLAB_FAILED };
-
 struct slab_work {
 	struct work work;
 	struct request *request;
@@ -26,11 +24,11 @@ struct slab_work {
 	char tag[ENTITY_TAG_SIZE];
 	double deadline_ms, queued_ms;
 	bool refused; /* too many wait */
-	enum slab_outcome outcome;
+	enum call_outcome outcome;
 	char *answer;
 
 	/* Whoever computes asks often, which costs a system call: the reason to stop, and when to look for one again. */
-	_Atomic int stop; /* enum slab_outcome */
+	_Atomic int stop; /* enum call_outcome */
 	_Atomic double ask_ms;
 };
 
@@ -56,58 +54,26 @@ static bool is_tracing(const struct slab_work *work)
 
 /* --- answering, on the HTTP thread ------------------------------------------------------------------------------------------ */
 
-/* The numbers follow from the query and the program that computes them. false when out of memory. */
-static bool set_tag(struct slab_work *work, const struct service *service)
-{
-	struct text tagged = {0};
-	char *canonical = slab_query_canonical(&work->query);
-	text_printf(&tagged, "slab|%s|%s", canonical ? canonical : "", service->pixel_version);
-	bool good = canonical && !tagged.failed;
-	if (good)
-		entity_tag_of(tagged.data, tagged.length, work->tag);
-	free(canonical);
-	text_finish(&tagged);
-	return good;
-}
-
 static enum MHD_Result send_numbers(struct request *request, unsigned status, struct MHD_Response *response)
 {
 	const struct slab_work *work = request->work;
-	if (status == MHD_HTTP_OK)
-		response_set(response, "Content-Type", "application/json");
-	response_set(response, "ETag", work->tag);
-	response_set(response, "Cache-Control", CACHE_KEEP);
-	return response_send(request, status, response);
+	return call_send_json(request, status, response, work->tag, CACHE_KEEP);
 }
 
-static enum MHD_Result send_refusal(struct request *request)
+static enum MHD_Result refuse_tracing(struct request *request)
 {
 	metrics_count_rejection(request->service->metrics, REJECTED_FULL);
-	if (is_tracing(request->work))
-		return response_send_new_problem(request, PROBLEM_TRACINGS_FULL, "%d photon tracings are waiting, and no more may.",
-						 SERVICE_TRACINGS_MAX);
-	return response_send_new_problem(request, PROBLEM_COMPUTERS_FULL, "%d such calls are waiting, and no more may.",
-					 request->service->config->queue_length);
+	return response_send_new_problem(request, PROBLEM_TRACINGS_FULL, "%d photon tracings are waiting, and no more may.",
+					 SERVICE_TRACINGS_MAX);
 }
 
 static enum MHD_Result finish(struct request *request)
 {
 	struct slab_work *work = request->work;
 	if (work->refused)
-		return send_refusal(request);
-	switch (work->outcome) {
-	case SLAB_EXPIRED:
-		return response_send_new_problem(request, PROBLEM_DEADLINE, "The numbers were not ready within their deadline.");
-	case SLAB_ABANDONED:
-		return MHD_NO;
-	case SLAB_STOPPED:
-		return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
-	case SLAB_FAILED:
-		return response_send_new_problem(request, PROBLEM_INTERNAL,
-						 "The layer could not be computed. The log has the reason under %s.", request->id);
-	case SLAB_OK:
-		break;
-	}
+		return is_tracing(work) ? refuse_tracing(request) : call_refuse_computing(request);
+	if (work->outcome != CALL_OK)
+		return call_send_failure(request, work->outcome, "The layer");
 	struct MHD_Response *response = response_create(request, work->answer, strlen(work->answer));
 	work->answer = NULL;
 	return send_numbers(request, MHD_HTTP_OK, response);
@@ -115,20 +81,16 @@ static enum MHD_Result finish(struct request *request)
 
 /* --- when to stop, on any thread ---------------------------------------------------------------------------------------------- */
 
-/* SLAB_OK: the answer is still wanted. A shutdown finishes what takes a moment, and does not wait for photons. */
-static enum slab_outcome reason_to_stop(const struct slab_work *work)
+/* A shutdown finishes what takes a moment, and does not wait for photons. */
+static enum call_outcome reason_to_stop(const struct slab_work *work)
 {
-	const struct service *service = work->request->service;
-	if (clock_now_ms() >= work->deadline_ms)
-		return SLAB_EXPIRED;
-	if (service->giving_up || (is_tracing(work) && service->stopping))
-		return SLAB_STOPPED;
-	return request_is_abandoned(work->request) ? SLAB_ABANDONED : SLAB_OK;
+	const enum call_outcome reason = call_reason_to_stop(work->request, work->deadline_ms);
+	return reason != CALL_EXPIRED && is_tracing(work) && work->request->service->stopping ? CALL_STOPPED : reason;
 }
 
 static bool waits_in_vain(struct work *base)
 {
-	return reason_to_stop(work_of(base)) != SLAB_OK;
+	return reason_to_stop(work_of(base)) != CALL_OK;
 }
 
 /* While photons are traced the tracings that wait are looked after from here: their deadlines do not depend on that one's length. */
@@ -136,13 +98,13 @@ static bool is_cancelled(void *context)
 {
 	struct slab_work *work = context;
 	double now = clock_now_ms();
-	if (work->stop != SLAB_OK || now < work->ask_ms)
-		return work->stop != SLAB_OK;
+	if (work->stop != CALL_OK || now < work->ask_ms)
+		return work->stop != CALL_OK;
 	work->ask_ms = now + ASK_EVERY_MS;
 	work->stop = (int)reason_to_stop(work);
 	if (is_tracing(work))
 		worker_pool_sweep(work->request->service->tracers, waits_in_vain);
-	return work->stop != SLAB_OK;
+	return work->stop != CALL_OK;
 }
 
 /* --- computing, on a worker ------------------------------------------------------------------------------------------------------ */
@@ -198,14 +160,14 @@ static void evaluate(struct slab_work *work)
 
 static void count(const struct slab_work *work)
 {
-	static const enum metrics_end ends[] = {[SLAB_EXPIRED] = ENDED_EXPIRED,
-						[SLAB_ABANDONED] = ENDED_ABANDONED,
-						[SLAB_STOPPED] = ENDED_ABANDONED,
-						[SLAB_FAILED] = ENDED_FAILED};
+	static const enum metrics_end ends[] = {[CALL_EXPIRED] = ENDED_EXPIRED,
+						[CALL_ABANDONED] = ENDED_ABANDONED,
+						[CALL_STOPPED] = ENDED_ABANDONED,
+						[CALL_FAILED] = ENDED_FAILED};
 	struct metrics *metrics = work->request->service->metrics;
 	if (!is_tracing(work))
 		return;
-	if (work->outcome == SLAB_OK)
+	if (work->outcome == CALL_OK)
 		metrics_count_photons(metrics, BAND_COUNT * work->query.photons);
 	else
 		metrics_count_tracing_end(metrics, ends[work->outcome]);
@@ -216,13 +178,13 @@ static void run(struct work *base)
 	struct slab_work *work = work_of(base);
 	timings_set(&work->request->timings, TIMING_QUEUE, clock_now_ms() - work->queued_ms);
 	work->outcome = reason_to_stop(work);
-	if (work->outcome == SLAB_OK) {
+	if (work->outcome == CALL_OK) {
 		(is_tracing(work) ? trace : evaluate)(work);
-		work->outcome = work->stop ? (enum slab_outcome)work->stop : reason_to_stop(work);
+		work->outcome = work->stop ? (enum call_outcome)work->stop : reason_to_stop(work);
 	}
-	if (work->outcome == SLAB_OK && !work->answer) {
+	if (work->outcome == CALL_OK && !work->answer) {
 		log_error("request %s: the layer could not be computed", work->request->id);
-		work->outcome = SLAB_FAILED;
+		work->outcome = CALL_FAILED;
 	}
 	count(work);
 	request_resume(work->request);
@@ -258,11 +220,8 @@ enum MHD_Result route_slab(struct request *request)
 	work->deadline_ms = request_read_deadline(request);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);
-	if (!set_tag(work, request->service))
+	enum MHD_Result result;
+	if (!call_tag(request->service, "slab", slab_query_canonical(&work->query), work->tag))
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
-	if (entity_tag_matches(request_header(request, "If-None-Match"), work->tag))
-		return send_numbers(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
-	if (request->is_head)
-		return send_numbers(request, MHD_HTTP_OK, response_create_unsized());
-	return enqueue(request);
+	return call_answer_at_once(request, work->tag, send_numbers, &result) ? result : enqueue(request);
 }

@@ -4,6 +4,7 @@
 #include "renderer/embed.h"
 #include "renderer/log.h"
 #include "server/response.h"
+#include "server/scene_query.h"
 
 #include <string.h>
 
@@ -40,6 +41,8 @@ static json_t *preset_to_json(const struct embedded_file *file)
 
 enum MHD_Result route_presets(struct request *request)
 {
+	if (!scene_query_refuse(request->query, &request->problem))
+		return response_send_problem(request);
 	json_t *presets = json_array();
 	for (const struct embedded_file *file = resource_files; file->name; file++) {
 		json_t *preset = preset_to_json(file);

@@ -4,6 +4,7 @@
 
 static const struct route routes[] = {
 	{"/v1/render", "GET, HEAD, POST", route_render, ROUTE_RENDER},
+	{"/v1/compare", "POST", route_compare, ROUTE_COMPARE},
 	{"/v1/optics", "GET, HEAD", route_optics, ROUTE_OPTICS},
 	{"/v1/slab", "GET, HEAD", route_slab, ROUTE_SLAB},
 	{"/v1/sky", "GET, HEAD", route_sky, ROUTE_SKY},

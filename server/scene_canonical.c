@@ -107,7 +107,20 @@ static bool is_one_of(const char *name, const char *const *names)
 	return name_index(names, name) >= 0;
 }
 
-/* Has the member a meaning in this scene? Those without are refused when given, so the canonical form must not hold them. */
+/* The reference has no shading to choose and follows light between ground and clouds to its end, so that neither makes two pictures of one;
+ * how long it goes on is its own affair. */
+static bool is_meaningful_to_model(const struct scene_field *field, enum model_name model)
+{
+	static const char *const sampling[] = {"samples", "time_budget_ms", "seed", "partial", NULL};
+	if (strcmp(field->section, "radiosity") == 0)
+		return model != MODEL_REFERENCE;
+	if (is_one_of(field->name, sampling))
+		return model == MODEL_REFERENCE;
+	return model != MODEL_REFERENCE || strcmp(field->name, "shading") != 0;
+}
+
+/* Has the member a meaning in this scene? Those without are refused when given (but for those that any scene may keep beside the model
+ * reference), so the canonical form must not hold them. */
 static bool is_meaningful(const struct scene_field *field, const struct scene *scene)
 {
 	static const char *const procedural[] = {"type", "seed", "coverage", "albedo", NULL};
@@ -126,6 +139,8 @@ static bool is_meaningful(const struct scene_field *field, const struct scene *s
 	}
 	if (strcmp(field->section, "model") == 0 && strcmp(field->name, "paths") == 0)
 		return scene->model.paths != SCENE_PATHS_ALL;
+	if (strcmp(field->section, "model") == 0 || strcmp(field->section, "radiosity") == 0)
+		return is_meaningful_to_model(field, scene->model.name);
 	if (strcmp(field->section, "ground") == 0 && strcmp(field->name, "albedo") == 0)
 		return scene->ground.type == GROUND_LAMBERT;
 	if (strcmp(field->section, "camera") == 0)

@@ -54,10 +54,14 @@ const struct scene_field scene_fields[] = {
 	{"radiosity", "max_passes", FIELD_INTEGER, AT(scene.radiosity.max_passes), BETWEEN(0, 1024)},
 
 	{"model", "name", FIELD_CHOICE, AT(scene.model.name), .choices = scene_model_names,
-	 .choices_later = LATER(MODEL_REFERENCE) | LATER(MODEL_VOLUME) | LATER(MODEL_PLANAR)},
+	 .choices_later = LATER(MODEL_VOLUME) | LATER(MODEL_PLANAR)},
 	{"model", "shading", FIELD_CHOICE, AT(scene.model.shading), .choices = scene_shading_names},
 	{"model", "optics", FIELD_CHOICE, AT(scene.model.optics), .choices = scene_optics_names},
 	{"model", "paths", FIELD_CHOICES, AT(scene.model.paths), .choices = scene_path_names},
+	{"model", "samples", FIELD_INTEGER, AT(scene.model.samples), BETWEEN(1, 65536)},
+	{"model", "time_budget_ms", FIELD_NUMBER, AT(scene.model.time_budget_ms), BETWEEN(0, 600000)},
+	{"model", "seed", FIELD_SEED, AT(scene.model.seed), BETWEEN(0, UINT32_MAX)},
+	{"model", "partial", FIELD_BOOLEAN, AT(scene.model.partial)},
 
 	{"output", "width", FIELD_INTEGER, AT(scene.output.width), BETWEEN(16, 8192)},
 	{"output", "height", FIELD_INTEGER, AT(scene.output.height), BETWEEN(16, 8192)},

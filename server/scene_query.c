@@ -104,3 +104,18 @@ void scene_query_read(const struct query *query, bool (*wanted)(const struct sce
 			problem_add(problem, pointer, "is not a member here");
 	}
 }
+
+static bool is_wanted_by_none(const struct scene_field *field)
+{
+	(void)field;
+	return false;
+}
+
+bool scene_query_refuse(const char *text, struct problem *problem)
+{
+	struct query query;
+	if (query_parse(text, &query, problem))
+		scene_query_read(&query, is_wanted_by_none, NULL, problem);
+	query_finish(&query);
+	return problem->kind == PROBLEM_NONE;
+}

@@ -13,6 +13,9 @@
 void scene_query_read(const struct query *query, bool (*wanted)(const struct scene_field *field), struct scene_input *input,
 		      struct problem *problem);
 
+/* Refuses every member of the query's text (NULL: none): this call takes none. false when there are any, or it cannot be read. */
+bool scene_query_refuse(const char *text, struct problem *problem);
+
 /* Reads one value by its field; pointer names it in the problem. */
 void scene_query_read_field(const struct scene_field *field, const char *value, const char *pointer, struct scene_input *input,
 			    struct problem *problem);

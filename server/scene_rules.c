@@ -126,6 +126,21 @@ static void check_camera(const struct scene_input *input, struct problem *proble
 			    clouds->base_m, clouds->base_m + clouds->thickness_m);
 }
 
+/* Any scene may be rendered as its own reference, which has no use for what the slab is told of shading and radiosity: it is put back to
+ * what it usually is, since it must not make two scenes of one. */
+static void check_model(struct scene_input *input, struct problem *problem)
+{
+	static const char *const sampling[] = {"samples", "time_budget_ms", "seed", "partial", NULL};
+	struct scene *scene = &input->scene;
+	const bool known = !problem_mentions(problem, "/model/name");
+	if (scene->model.name == MODEL_REFERENCE) {
+		scene->model.shading = scene_default().model.shading;
+		scene->radiosity = scene_default().radiosity;
+	} else if (known) {
+		refuse_given(input, "model", sampling, "goes with the model reference only", problem);
+	}
+}
+
 /* One side of a picture that follows from the other. Both have the same range; `ratio` is that side's to the other's. */
 static void follow(const char *name, int value, const int ratio[2], int *other, struct problem *problem)
 {
@@ -178,6 +193,8 @@ static void check_output(const struct scene_input *input, struct problem *proble
 		return;
 	if (output->format == IMAGE_PNG && output->layers != 1u << LAYER_COLOR)
 		problem_add(problem, "/output/layers", "other layers than color need the format exr");
+	if ((output->layers >> LAYER_STANDARD_ERROR & 1) && input->scene.model.name != MODEL_REFERENCE)
+		problem_add(problem, "/output/layers", "standard_error is of the model reference only");
 	int64_t pixels = (int64_t)output->width * output->height * __builtin_popcount(output->layers);
 	if (pixels > SCENE_PIXELS_MAX)
 		problem_add(problem, "/output", "width x height x layers is %lld pixels: at most %d", (long long)pixels, SCENE_PIXELS_MAX);
@@ -190,6 +207,7 @@ void scene_rules_apply(struct scene_input *input, struct problem *problem)
 	check_clouds(input, problem);
 	check_ground(input, problem);
 	check_camera(input, problem);
+	check_model(input, problem);
 	resolve_size(input, problem);
 	check_output(input, problem);
 }

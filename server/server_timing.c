@@ -2,7 +2,8 @@
 
 #include <stdio.h>
 
-const char *const timing_names[TIMING_COUNT] = {"queue", "optics", "sky", "field", "radiosity", "view", "readback", "encode", "total"};
+const char *const timing_names[TIMING_COUNT] = {"queue", "optics",   "sky",     "field",  "radiosity",
+						"view",  "readback", "compare", "encode", "total"};
 
 void timings_set(struct timings *timings, enum timing timing, double milliseconds)
 {
@@ -22,6 +23,17 @@ void timings_set_frame(struct timings *timings, const struct frame *frame)
 	}
 	timings->radiosity_passes = frame->radiosity_passes;
 	timings->radiosity_residual = frame->radiosity_residual;
+}
+
+void timings_add_frame(struct timings *timings, const struct timings *frame)
+{
+	for (int i = 0; i < TIMING_COUNT; i++) {
+		if (!frame->entry[i].measured)
+			continue;
+		timings->entry[i].reused = frame->entry[i].reused && (timings->entry[i].reused || !timings->entry[i].measured);
+		timings->entry[i].measured = true;
+		timings->entry[i].milliseconds += frame->entry[i].milliseconds;
+	}
 }
 
 void timings_add_optics(struct timings *timings, double milliseconds, bool computed)

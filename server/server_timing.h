@@ -12,6 +12,7 @@ enum timing {
 	TIMING_RADIOSITY,
 	TIMING_VIEW,
 	TIMING_READBACK,
+	TIMING_COMPARE,
 	TIMING_ENCODE,
 	TIMING_TOTAL,
 	TIMING_COUNT
@@ -36,6 +37,9 @@ void timings_set(struct timings *timings, enum timing timing, double millisecond
 
 /* Takes over the stages of a rendered frame. */
 void timings_set_frame(struct timings *timings, const struct frame *frame);
+
+/* Adds those of another one; what any of them had to make was not reused. */
+void timings_add_frame(struct timings *timings, const struct timings *frame);
 
 /* Adds what was spent on the optics before; `computed`: they did not come from memory. */
 void timings_add_optics(struct timings *timings, double milliseconds, bool computed);

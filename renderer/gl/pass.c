@@ -15,7 +15,7 @@ struct pass {
 	GLuint program;
 	GLuint framebuffer, vertex_array; /* fragment passes alone */
 	int outputs;
-	bool compute;
+	bool compute, adds;
 	GLint arguments, size;
 	char name[64];
 };
@@ -32,14 +32,17 @@ static void append_fragment_wrapper(struct source *source, int outputs)
 	source_print(source, "void pass(ivec2 pixel);\nvoid main() { pass(ivec2(gl_FragCoord.xy)); }\n");
 }
 
-static void append_compute_wrapper(struct source *source, int outputs)
+static void append_compute_wrapper(struct source *source, int outputs, bool adds)
 {
+	static const char at[] = "ivec2(gl_GlobalInvocationID.xy) + ivec2(0, pass_size.z)";
 	source_print(source, "layout(local_size_x = %d, local_size_y = %d) in;\n", GROUP_SIDE, GROUP_SIDE);
 	source_print(source, "uniform ivec4 pass_size; // columns, rows, first row\n");
-	source_print(source,
-		     "#define STORE(i, value) imageStore(output_##i, ivec2(gl_GlobalInvocationID.xy) + ivec2(0, pass_size.z), value)\n");
+	if (adds)
+		source_print(source, "#define STORE(i, value) imageStore(output_##i, %s, imageLoad(output_##i, %s) + (value))\n", at, at);
+	else
+		source_print(source, "#define STORE(i, value) imageStore(output_##i, %s, value)\n", at);
 	for (int i = 0; i < outputs; i++)
-		source_print(source, "layout(binding = %d) writeonly uniform image2D output_%d;\n", i, i);
+		source_print(source, "layout(binding = %d%s uniform image2D output_%d;\n", i, adds ? ", rgba32f)" : ") writeonly", i);
 	source_print(source, "void pass(ivec2 pixel);\nvoid main() {\n"
 			     "\tivec2 pixel = ivec2(gl_GlobalInvocationID.xy);\n"
 			     "\tif (all(lessThan(pixel, pass_size.xy))) pass(pixel + ivec2(0, pass_size.z));\n}\n");
@@ -51,7 +54,7 @@ static bool assemble(struct source *source, const struct pass_compiler *compiler
 	if (desc->defines)
 		source_print(source, "%s", desc->defines);
 	if (compute)
-		append_compute_wrapper(source, desc->outputs);
+		append_compute_wrapper(source, desc->outputs, desc->adds);
 	else
 		append_fragment_wrapper(source, desc->outputs);
 	return source_include(source, compiler->shader_dir, desc->file);
@@ -128,6 +131,7 @@ struct pass *pass_create(const struct pass_compiler *compiler, const struct pass
 		return NULL;
 	snprintf(pass->name, sizeof pass->name, "%s", desc->file);
 	pass->outputs = desc->outputs;
+	pass->adds = desc->adds;
 	pass->compute = compiler->kind == PASS_COMPUTE || desc->outputs == 0;
 	if (!assemble(&source, compiler, desc, pass->compute) || !link(pass, source.text))
 		goto fail;
@@ -163,7 +167,8 @@ static void run_compute(const struct pass *pass, const struct pass_run *run, int
 	for (int i = 0; i < pass->outputs; i++) {
 		/* Stores to an image unit without a texture are discarded. */
 		const struct texture *target = run->targets[i];
-		glBindImageTexture((GLuint)i, target ? target->id : 0, target ? run->level : 0, GL_FALSE, 0, GL_WRITE_ONLY,
+		glBindImageTexture((GLuint)i, target ? target->id : 0, target ? run->level : 0, GL_FALSE, 0,
+				   pass->adds ? GL_READ_WRITE : GL_WRITE_ONLY,
 				   texture_internal_format(target ? target->format : TEXTURE_RGBA32F));
 	}
 	glProgramUniform4i(pass->program, pass->size, width, height, run->first_row, 0);
@@ -188,7 +193,12 @@ static void run_fragment(const struct pass *pass, const struct pass_run *run, in
 	glEnable(GL_SCISSOR_TEST);
 	glScissor(0, run->first_row, width, height);
 	glBindVertexArray(pass->vertex_array);
+	if (pass->adds) {
+		glEnable(GL_BLEND);
+		glBlendFunc(GL_ONE, GL_ONE);
+	}
 	glDrawArrays(GL_TRIANGLES, 0, 3);
+	glDisable(GL_BLEND);
 	/* Detached again, so that a texture deleted later is really freed, and none stays attached while it is sampled. */
 	for (int i = 0; i < pass->outputs; i++)
 		glNamedFramebufferTexture(pass->framebuffer, attachments[i], 0, 0);

@@ -20,6 +20,7 @@ struct pass_desc {
 	const char *defines;                     /* lines of #define, or NULL */
 	int outputs;                             /* 1..PASS_OUTPUTS_MAX; 0 for a pass that writes buffers only (always compute) */
 	const char *samplers[PASS_SAMPLERS_MAX]; /* names, in the order of the textures at pass_run */
+	bool adds;                               /* STORE adds to what the targets hold, all of TEXTURE_RGBA32F */
 };
 
 struct pass_compiler {

@@ -16,6 +16,20 @@ struct image_metadata {
 	const char *scene_json; /* canonical scene, kept as "stratus:scene"; never NULL */
 	const char *request_id; /* or NULL; not written to files (same scene, same bytes), for the log only */
 	const char *software;   /* "stratus 0.3.0" */
+	const char *comparison; /* figures of a comparison, JSON, kept as "stratus:comparison"; NULL: it is none */
+};
+
+/* One channel of an EXR that is put together from several pictures. */
+struct image_plane {
+	const char *name;    /* as in the file: "solved.flip.Y" */
+	const float *values; /* of the upper left pixel, rows from the top */
+	int stride;          /* values between neighbouring pixels */
+};
+
+struct image_planes {
+	int width, height;
+	const struct image_plane *plane;
+	size_t count; /* from 1 */
 };
 
 struct image_buffer {
@@ -40,6 +54,9 @@ struct image_api {
 	 * `error` (at most error_size) on failure; buffer->data is then NULL. */
 	bool (*encode)(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata,
 		       struct image_buffer *buffer, char *error, size_t error_size);
+	/* Encodes channels as an EXR, its type and compression those of the scene's output, its camera the scene's. Likewise. */
+	bool (*encode_planes)(const struct image_planes *planes, const struct scene *scene, const struct image_metadata *metadata,
+			      struct image_buffer *buffer, char *error, size_t error_size);
 	/* Reads the picture that picture_file_read found in an open file. Nothing but the reader of its format runs. Any thread, several at
 	 * once. false and a message in `error` when the file is damaged or `take` stopped it. */
 	bool (*decode)(int fd, const struct picture_file *file, image_rows_taker *take, void *context, char *error, size_t error_size);

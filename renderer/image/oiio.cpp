@@ -144,7 +144,14 @@ bytes encode_png(const struct frame &frame, const struct scene &scene, const str
 	char exposure[32];
 	std::snprintf(exposure, sizeof exposure, "%.4f", frame.exposure_ev);
 	png_insert_text(png, "stratus:exposure_ev", exposure);
-	png_insert_text(png, "stratus:scene", metadata.scene_json);
+	if (metadata.comparison)
+		png_insert_text(png, "stratus:comparison", metadata.comparison);
+	else
+		png_insert_text(png, "stratus:scene", metadata.scene_json);
+	if (frame.samples > 0) {
+		png_insert_text(png, "stratus:partial", frame.partial ? "true" : "false");
+		png_insert_text(png, "stratus:samples", std::to_string(frame.samples).c_str());
+	}
 	return png;
 }
 
@@ -152,8 +159,13 @@ bytes encode_png(const struct frame &frame, const struct scene &scene, const str
 
 struct channel {
 	std::string name;
-	const float *first; /* of the plane's pixels; the next one is frame.channels further */
+	const float *first; /* of the plane's pixels */
+	int stride;         /* to the next one */
 	bool is_half;
+};
+
+struct picture_size {
+	int width, height;
 };
 
 /* Names that compositors group: R, G, B for color, NAME.R .G .B for the others; depth is Z and a plain quantity Y. */
@@ -168,12 +180,12 @@ std::vector<std::string> channel_names(enum layer layer)
 }
 
 /* The largest magnitude of a channel; refuses what is not finite, since it would spread through any later filter. */
-float channel_peak(const struct frame &frame, const struct channel &channel)
+float channel_peak(picture_size size, const struct channel &channel)
 {
-	const size_t count = static_cast<size_t>(frame.width) * frame.height;
+	const size_t count = static_cast<size_t>(size.width) * size.height;
 	float peak = 0, poison = 0;
 	for (size_t i = 0; i < count; i++) {
-		const float value = channel.first[i * frame.channels];
+		const float value = channel.first[i * channel.stride];
 		peak = std::max(peak, std::fabs(value));
 		poison += value * 0.0f; /* NaN from the first inf or NaN on */
 	}
@@ -182,22 +194,37 @@ float channel_peak(const struct frame &frame, const struct channel &channel)
 	return peak;
 }
 
-std::vector<channel> choose_channels(const struct frame &frame, enum exr_type type, bool &clamped)
+std::vector<channel> list_channels(const struct frame &frame)
 {
 	std::vector<channel> channels;
 	const size_t plane = static_cast<size_t>(frame.width) * frame.height * frame.channels;
 	for (int i = 0; i < frame.layer_count; i++) {
 		int component = 0;
-		for (const std::string &name : channel_names(frame.layer[i])) {
-			channel added = {name, static_cast<const float *>(frame.pixels) + i * plane + component++, type != EXR_FLOAT};
-			const bool too_large = channel_peak(frame, added) > half_max;
-			if (type == EXR_AUTO && too_large)
-				added.is_half = false;
-			clamped = clamped || (type == EXR_HALF && too_large);
-			channels.push_back(added);
-		}
+		for (const std::string &name : channel_names(frame.layer[i]))
+			channels.push_back(
+				{name, static_cast<const float *>(frame.pixels) + i * plane + component++, frame.channels, false});
 	}
 	return channels;
+}
+
+std::vector<channel> list_channels(const struct image_planes &planes)
+{
+	std::vector<channel> channels;
+	for (size_t i = 0; i < planes.count; i++)
+		channels.push_back({planes.plane[i].name, planes.plane[i].values, planes.plane[i].stride, false});
+	return channels;
+}
+
+/* Half where the type allows. Returns whether that clamps any value. */
+bool choose_types(picture_size size, enum exr_type type, std::vector<channel> &channels)
+{
+	bool clamped = false;
+	for (channel &channel : channels) {
+		const bool too_large = channel_peak(size, channel) > half_max;
+		channel.is_half = type != EXR_FLOAT && !(type == EXR_AUTO && too_large);
+		clamped = clamped || (type == EXR_HALF && too_large);
+	}
+	return clamped;
 }
 
 /* From the file's world (+X east, +Y up, +Z south) to EXR's camera space (left-handed, +x right, +y up, +z view), as Imath has
@@ -283,10 +310,10 @@ void describe_time_and_place(ImageSpec &spec, const struct scene_sun &sun)
 	spec.attribute("longitude", static_cast<float>(sun.longitude_deg));
 }
 
-ImageSpec exr_spec(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata,
+ImageSpec exr_spec(picture_size size, const struct scene &scene, const struct image_metadata &metadata,
 		   const std::vector<channel> &channels, bool clamped)
 {
-	ImageSpec spec(frame.width, frame.height, static_cast<int>(channels.size()), TypeDesc::FLOAT);
+	ImageSpec spec(size.width, size.height, static_cast<int>(channels.size()), TypeDesc::FLOAT);
 	spec.channelnames.clear();
 	for (const channel &channel : channels) {
 		spec.channelnames.push_back(channel.name);
@@ -302,29 +329,39 @@ ImageSpec exr_spec(const struct frame &frame, const struct scene &scene, const s
 	spec.attribute("altitude", static_cast<float>(scene.camera.position_m[2]));
 	describe_projection(spec, scene);
 	spec.attribute("stratus:scene", metadata.scene_json);
-	spec.attribute("stratus:exposure_ev", static_cast<float>(frame.exposure_ev));
-	spec.attribute("stratus:global_illuminance_lux", static_cast<float>(frame.global_illuminance_lux));
-	spec.attribute("stratus:direct_illuminance_lux", static_cast<float>(frame.direct_illuminance_lux));
-	spec.attribute("stratus:diffuse_illuminance_lux", static_cast<float>(frame.diffuse_illuminance_lux));
+	if (metadata.comparison)
+		spec.attribute("stratus:comparison", metadata.comparison);
 	if (clamped)
 		spec.attribute("stratus:clamped_to", half_max);
 	return spec;
 }
 
+void describe_frame(ImageSpec &spec, const struct frame &frame)
+{
+	spec.attribute("stratus:exposure_ev", static_cast<float>(frame.exposure_ev));
+	spec.attribute("stratus:global_illuminance_lux", static_cast<float>(frame.global_illuminance_lux));
+	spec.attribute("stratus:direct_illuminance_lux", static_cast<float>(frame.direct_illuminance_lux));
+	spec.attribute("stratus:diffuse_illuminance_lux", static_cast<float>(frame.diffuse_illuminance_lux));
+	if (frame.samples > 0) {
+		spec.attribute("stratus:samples", frame.samples);
+		spec.attribute("stratus:partial", frame.partial ? 1 : 0);
+	}
+}
+
 /* Rows y..y_end as the file has them: pixel by pixel, each channel in its own type. */
-void pack_rows(const struct frame &frame, const std::vector<channel> &channels, int y, int y_end, bytes &packed)
+void pack_rows(int width, const std::vector<channel> &channels, int y, int y_end, bytes &packed)
 {
 	size_t pixel_bytes = 0;
 	for (const channel &channel : channels)
 		pixel_bytes += channel.is_half ? 2 : 4;
-	const size_t first = static_cast<size_t>(y) * frame.width, count = static_cast<size_t>(y_end - y) * frame.width;
+	const size_t first = static_cast<size_t>(y) * width, count = static_cast<size_t>(y_end - y) * width;
 	packed.resize(pixel_bytes * count);
 
 	size_t offset = 0;
 	for (const channel &channel : channels) {
-		const float *from = channel.first + first * frame.channels;
+		const float *from = channel.first + first * channel.stride;
 		unsigned char *to = packed.data() + offset;
-		for (size_t i = 0; i < count; i++, from += frame.channels, to += pixel_bytes) {
+		for (size_t i = 0; i < count; i++, from += channel.stride, to += pixel_bytes) {
 			if (channel.is_half) {
 				const half value(std::min(std::max(*from, -half_max), half_max));
 				std::memcpy(to, &value, 2);
@@ -336,24 +373,40 @@ void pack_rows(const struct frame &frame, const std::vector<channel> &channels, 
 	}
 }
 
-bytes encode_exr(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata)
+bytes write_exr(const ImageSpec &spec, const std::vector<channel> &channels)
 {
-	require(frame.type == PIXEL_F32, "an EXR needs a scene-linear frame");
-	bool clamped = false;
-	const std::vector<channel> channels = choose_channels(frame, scene.output.exr_type, clamped);
-
 	OIIO::Filesystem::IOVecOutput proxy;
-	auto out = open_output("exr", exr_spec(frame, scene, metadata, channels, clamped), &proxy);
+	auto out = open_output("exr", spec, &proxy);
 	bytes rows;
 	constexpr int rows_at_once = 64; /* a multiple of every compressor's block, at most 32 lines */
-	for (int y = 0; y < frame.height; y += rows_at_once) {
-		const int y_end = std::min(y + rows_at_once, frame.height);
-		pack_rows(frame, channels, y, y_end, rows);
+	for (int y = 0; y < spec.height; y += rows_at_once) {
+		const int y_end = std::min(y + rows_at_once, spec.height);
+		pack_rows(spec.width, channels, y, y_end, rows);
 		if (!out->write_scanlines(y, y_end, 0, TypeDesc::UNKNOWN, rows.data()))
 			throw std::runtime_error(out->geterror());
 	}
 	close_output(*out);
 	return std::move(proxy.buffer());
+}
+
+bytes encode_exr(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata)
+{
+	require(frame.type == PIXEL_F32, "an EXR needs a scene-linear frame");
+	const picture_size size = {frame.width, frame.height};
+	std::vector<channel> channels = list_channels(frame);
+	const bool clamped = choose_types(size, scene.output.exr_type, channels);
+	ImageSpec spec = exr_spec(size, scene, metadata, channels, clamped);
+	describe_frame(spec, frame);
+	return write_exr(spec, channels);
+}
+
+bytes encode_exr_planes(const struct image_planes &planes, const struct scene &scene, const struct image_metadata &metadata)
+{
+	require(planes.width >= 1 && planes.height >= 1 && planes.count >= 1, "there are no planes");
+	const picture_size size = {planes.width, planes.height};
+	std::vector<channel> channels = list_channels(planes);
+	const bool clamped = choose_types(size, scene.output.exr_type, channels);
+	return write_exr(exr_spec(size, scene, metadata, channels, clamped), channels);
 }
 
 /* --- reading --------------------------------------------------------------------------------------------------------------- */
@@ -494,14 +547,12 @@ void check_frame(const struct frame &frame)
 	require(frame.pixels && frame.bytes >= needed, "the frame holds fewer pixels than its size says");
 }
 
-bool encode(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata, struct image_buffer *buffer,
-	    char *error, size_t error_size) noexcept
+/* Runs an encoder and hands over what it wrote. */
+template <typename Encoder> bool deliver(struct image_buffer *buffer, char *error, size_t error_size, const Encoder &encoder) noexcept
 {
 	*buffer = {};
 	try {
-		check_frame(*frame);
-		const bytes file =
-			scene->output.format == IMAGE_PNG ? encode_png(*frame, *scene, *metadata) : encode_exr(*frame, *scene, *metadata);
+		const bytes file = encoder();
 		buffer->data = static_cast<unsigned char *>(std::malloc(file.size()));
 		require(buffer->data, "out of memory");
 		std::memcpy(buffer->data, file.data(), file.size());
@@ -513,6 +564,21 @@ bool encode(const struct frame *frame, const struct scene *scene, const struct i
 		std::snprintf(error, error_size, "unknown failure of the image library");
 	}
 	return false;
+}
+
+bool encode(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata, struct image_buffer *buffer,
+	    char *error, size_t error_size) noexcept
+{
+	return deliver(buffer, error, error_size, [&] {
+		check_frame(*frame);
+		return scene->output.format == IMAGE_PNG ? encode_png(*frame, *scene, *metadata) : encode_exr(*frame, *scene, *metadata);
+	});
+}
+
+bool encode_planes(const struct image_planes *planes, const struct scene *scene, const struct image_metadata *metadata,
+		   struct image_buffer *buffer, char *error, size_t error_size) noexcept
+{
+	return deliver(buffer, error, error_size, [&] { return encode_exr_planes(*planes, *scene, *metadata); });
 }
 
 bool decode(int fd, const struct picture_file *file, image_rows_taker *take, void *context, char *error, size_t error_size) noexcept
@@ -528,7 +594,7 @@ bool decode(int fd, const struct picture_file *file, image_rows_taker *take, voi
 	return false;
 }
 
-const struct image_api api = {"OpenImageIO " OIIO_VERSION_STRING ", zlib " ZLIB_VERSION, encode, decode};
+const struct image_api api = {"OpenImageIO " OIIO_VERSION_STRING ", zlib " ZLIB_VERSION, encode, encode_planes, decode};
 
 } // namespace
 

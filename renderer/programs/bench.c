@@ -14,16 +14,21 @@
 struct setting {
 	const char *name;
 	size_t offset;
-	const char *const *words; /* enumerations are stored as int; NULL for a double */
+	const char *const *words; /* enumerations are stored as int; NULL for a number */
+	bool whole;               /* an int, else a double */
 };
 
 #define NUMBER(name, member)                                                                                                               \
 	{                                                                                                                                  \
-		name, offsetof(struct scene, member), NULL                                                                                 \
+		name, offsetof(struct scene, member), NULL, false                                                                          \
+	}
+#define WHOLE(name, member)                                                                                                                \
+	{                                                                                                                                  \
+		name, offsetof(struct scene, member), NULL, true                                                                           \
 	}
 #define WORD(name, member, words)                                                                                                          \
 	{                                                                                                                                  \
-		name, offsetof(struct scene, member), words                                                                                \
+		name, offsetof(struct scene, member), words, false                                                                         \
 	}
 
 static const struct setting settings[] = {
@@ -56,6 +61,10 @@ static const struct setting settings[] = {
 	WORD("camera.projection", camera.projection, scene_projection_names),
 	WORD("camera.face", camera.face, scene_face_names),
 	NUMBER("radiosity.tolerance", radiosity.tolerance),
+	WORD("model.name", model.name, scene_model_names),
+	WHOLE("model.samples", model.samples),
+	WHOLE("model.seed", model.seed),
+	NUMBER("model.time_budget_ms", model.time_budget_ms),
 	WORD("model.shading", model.shading, scene_shading_names),
 	WORD("model.optics", model.optics, scene_optics_names),
 };
@@ -64,10 +73,10 @@ static void usage(FILE *to)
 {
 	fprintf(to, "usage: render-bench [-k KERNEL] [-s SHADER_DIR] [-p auto|fragment|compute] [-d DEVICE] [-n FRAMES] [-w WIDTH] [-h "
 		    "HEIGHT]\n"
-		    "                    [-S SEED] [-r RESOLUTION] [-R] [-o FILE.ppm|FILE.pfm] [NAME=VALUE ...]\n"
+		    "                    [-S SEED] [-r RESOLUTION] [-R] [-o FILE.ppm|FILE.pfm] [-l LAYER] [NAME=VALUE ...]\n"
 		    "Renders the default scene with these changes and prints milliseconds per stage of the first frame, of a repeated one "
 		    "with the\n"
-		    "camera turned, and of one with another time. -R switches the radiosity off. NAME is a member as in JSON (camera.z_m "
+		    "camera turned, and of one with another time. -l says which layer a PFM gets. -R switches the radiosity off. NAME is a member as in JSON (camera.z_m "
 		    "for heights).\n");
 }
 
@@ -82,7 +91,11 @@ static bool apply(struct scene *scene, const char *text)
 		if (!s->words) {
 			char *end;
 			const double number = strtod(equals + 1, &end);
-			memcpy(at, &number, sizeof number);
+			const int whole = (int)number;
+			if (s->whole)
+				memcpy(at, &whole, sizeof whole);
+			else
+				memcpy(at, &number, sizeof number);
 			return *end == 0 && end != equals + 1;
 		}
 		for (int k = 0; s->words[k]; k++)
@@ -94,19 +107,26 @@ static bool apply(struct scene *scene, const char *text)
 	return false;
 }
 
+/* Of a PFM. */
+static enum layer written = LAYER_COLOR;
+
 static bool write_picture(const struct frame *frame, const char *path)
 {
+	int plane = 0;
+	while (frame->type == PIXEL_F32 && plane < frame->layer_count - 1 && frame->layer[plane] != written)
+		plane++;
 	FILE *file = fopen(path, "wb");
 	if (!file)
 		return false;
 	const size_t row = (size_t)frame->width * 3 * (frame->type == PIXEL_F32 ? 4 : 1);
+	const char *pixels = (const char *)frame->pixels + (size_t)plane * row * (size_t)frame->height;
 	if (frame->type == PIXEL_F32) {
 		fprintf(file, "PF\n%d %d\n-1\n", frame->width, frame->height);
 		for (int y = frame->height - 1; y >= 0; y--)
-			fwrite((char *)frame->pixels + (size_t)y * row, 1, row, file);
+			fwrite(pixels + (size_t)y * row, 1, row, file);
 	} else {
 		fprintf(file, "P6\n%d %d\n255\n", frame->width, frame->height);
-		fwrite(frame->pixels, 1, row * (size_t)frame->height, file);
+		fwrite(pixels, 1, row * (size_t)frame->height, file);
 	}
 	return fclose(file) == 0;
 }
@@ -133,6 +153,34 @@ static void print_timing(const char *name, const struct frame *frame, double wal
 	puts(")");
 }
 
+static int compare_floats(const void *a, const void *b)
+{
+	const float x = *(const float *)a, y = *(const float *)b;
+	return (x > y) - (x < y);
+}
+
+/* Median over the pixels of the standard error of their luminance (as if its channels erred together) over it; layers as main asks for them. */
+static double median_error(const struct frame *frame)
+{
+	static const double weight[] = {0.2126, 0.7152, 0.0722};
+	const size_t count = (size_t)frame->width * (size_t)frame->height;
+	const float *color = frame->pixels, *error = color + 3 * count * (size_t)(frame->layer_count - 1);
+	float *values = calloc(count, sizeof *values);
+	for (size_t i = 0; values && i < count; i++) {
+		double light = 1e-9, wrong = 0;
+		for (size_t c = 0; c < 3; c++) {
+			light += weight[c] * color[3 * i + c];
+			wrong += weight[c] * error[3 * i + c];
+		}
+		values[i] = (float)(wrong / light);
+	}
+	if (values)
+		qsort(values, count, sizeof *values, compare_floats);
+	const double median = values ? values[count / 2] : 0;
+	free(values);
+	return median;
+}
+
 static bool render(struct renderer *renderer, const struct scene *scene, const char *name, const char *path)
 {
 	struct frame frame;
@@ -140,6 +188,8 @@ static bool render(struct renderer *renderer, const struct scene *scene, const c
 	if (renderer_render(renderer, scene, NULL, NULL, &frame) != RENDER_OK)
 		return false;
 	print_timing(name, &frame, clock_milliseconds() - begin, processor_milliseconds() - processor);
+	if (frame.samples > 0 && frame.type == PIXEL_F32)
+		printf("%-16s %d samples, median standard error %.2f %%\n", "", frame.samples, 100 * median_error(&frame));
 	const bool ok = !path || write_picture(&frame, path);
 	frame_finish(&frame);
 	return ok;
@@ -151,7 +201,7 @@ int main(int argc, char **argv)
 	struct renderer_params params = {.device_index = -1};
 	struct scene scene = scene_default();
 	int frames = 3, width = 0, height = 0, option, status = 1;
-	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:r:Ro:")) != -1) {
+	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:r:Ro:l:")) != -1) {
 		switch (option) {
 		case 'k':
 			kernel_path = optarg;
@@ -186,6 +236,11 @@ int main(int argc, char **argv)
 		case 'o':
 			output = optarg;
 			break;
+		case 'l':
+			for (int i = 0; scene_layer_names[i]; i++)
+				if (strcmp(scene_layer_names[i], optarg) == 0)
+					written = (enum layer)i;
+			break;
 		default:
 			usage(stderr);
 			return 2;
@@ -200,6 +255,10 @@ int main(int argc, char **argv)
 			return 2;
 		}
 	}
+
+	if (scene.model.name == MODEL_REFERENCE)
+		scene.output.layers |= 1u << LAYER_STANDARD_ERROR;
+	scene.output.layers |= 1u << written;
 
 	const struct scene_shape shape = scene_camera_shape(&scene.camera);
 	scene.output.width = width ? width : shape.ratio[0] && height ? height * shape.ratio[0] / shape.ratio[1] : shape.width;

@@ -34,6 +34,11 @@ static const struct pass_desc develop_descs[2] = {
 static const enum view_ground grounds[GROUND_TYPE_COUNT] = {
 	[GROUND_GRASS] = VIEW_GROWN, [GROUND_COUNTRY] = VIEW_GROWN, [GROUND_SEA] = VIEW_SEA, [GROUND_SEA_ICE] = VIEW_ICE};
 
+enum view_ground view_ground_of(const struct scene *scene)
+{
+	return grounds[scene->ground.type];
+}
+
 struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
 	char defines[320];
@@ -99,7 +104,7 @@ static void set4(float *to, double x, double y, double z, double w)
 	to[3] = (float)w;
 }
 
-static void fill_camera(struct scene_block *block, const struct scene *scene, const struct camera_view *view)
+void view_fill_camera(struct scene_block *block, const struct scene *scene, const struct camera_view *view)
 {
 	const double(*axes)[3] = view->axes;
 	const double tile = scene->clouds.tile_m;
@@ -115,7 +120,7 @@ void view_fill_block(struct scene_block *block, const struct scene *scene)
 {
 	double matrix[3][3];
 	const struct camera_view view = camera_view_of(scene, 0);
-	fill_camera(block, scene, &view);
+	view_fill_camera(block, scene, &view);
 	colour_band_matrix(matrix);
 	set4(block->band_red, matrix[0][0], matrix[1][0], matrix[2][0], 0);
 	set4(block->band_green, matrix[0][1], matrix[1][1], matrix[2][1], 0);
@@ -354,7 +359,7 @@ static bool run_views(struct view_stage *stage, struct stage_context *context, c
 		const struct camera_view view = camera_view_of(scene, i);
 		variant.projection = view.projection;
 		variant.large_sun = stage->disc.views[i].large;
-		fill_camera(&context->block, scene, &view);
+		view_fill_camera(&context->block, scene, &view);
 		disc_buffer_bind(&stage->disc, i, &context->block);
 		stage_upload_block(context);
 		if (!(whole ? run_whole(stage, &view, variant, run) : run_regions(stage, context, &view, variant, run, fast ? &up : NULL)))
@@ -368,7 +373,7 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 				    bool layers)
 {
 	const enum view_side side = side_of(scene, inputs);
-	const enum view_ground ground = grounds[scene->ground.type];
+	const enum view_ground ground = view_ground_of(scene);
 	if (side == VIEW_CLEAR)
 		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground};
 	return (struct view_variant){.side = side,
@@ -423,7 +428,7 @@ static bool see_layer(struct view_stage *stage, struct stage_context *context, c
 	bool ok = height_view_create(scene, seen);
 	for (int i = 0; ok && i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
-		fill_camera(&context->block, scene, &view);
+		view_fill_camera(&context->block, scene, &view);
 		stage_upload_block(context);
 		ok = height_view_run(&stage->height, scene, &view, field, seen);
 	}

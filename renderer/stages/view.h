@@ -61,9 +61,14 @@ struct view_inputs {
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler);
 void view_stage_finish(struct view_stage *stage);
 
+enum view_ground view_ground_of(const struct scene *scene);
+
 /* Fills in the block's camera, of the picture's first view. Call before any pass runs, since the sky is tabulated from the camera's height.
  */
 void view_fill_block(struct scene_block *block, const struct scene *scene);
+
+/* Those of a view alone. */
+void view_fill_camera(struct scene_block *block, const struct scene *scene, const struct camera_view *view);
 
 /* Renders layers[0..count) into textures of the output's size (RGBA32F), owned by the cache and valid for this frame. cancelled may be
  * NULL; it is asked between passes. false when cancelled, out of memory, or when a program does not compile. */

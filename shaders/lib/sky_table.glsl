@@ -11,20 +11,26 @@ const vec2 SKY_TABLE_SIZE = vec2(96.0, 160.0);
 // 13 degrees of it. Columns: square root of sin(azimuth/2). No inverse trigonometry is needed to look a direction up.
 const float SKY_TABLE_POLE = 1.5;
 
-vec2 sky_table_coordinates(vec3 direction)
+// horizon: sine of its elevation; mu: of the direction's; above: is it over the horizon; cosine: of its azimuth from the sun.
+vec2 sky_table_at(float horizon, float mu, bool above, float cosine)
 {
 	float rows = 0.5 * SKY_TABLE_SIZE.y;
-	float horizon = sphere_horizon(camera_position.z);
-	float rise = direction.z - horizon;
-	float s = clamp(rise > 0.0 ? rise / (1.0 - horizon) : -rise / (1.0 + horizon), 0.0, 1.0);
+	float rise = mu - horizon;
+	float s = clamp(above ? rise / (1.0 - horizon) : -rise / (1.0 + horizon), 0.0, 1.0);
 	float from_horizon = SKY_TABLE_POLE * sqrt(s);
 	float unit = from_horizon / (from_horizon + sqrt(1.0 - s));
 	float row = 0.5 + unit * (rows - 1.0);
+	float column = sqrt(sqrt(clamp(0.5 - 0.5 * cosine, 0.0, 1.0)));
+	return vec2((0.5 + column * (SKY_TABLE_SIZE.x - 1.0)) / SKY_TABLE_SIZE.x, (above ? row : rows + row) / SKY_TABLE_SIZE.y);
+}
+
+vec2 sky_table_coordinates(vec3 direction)
+{
+	float horizon = sphere_horizon(camera_position.z);
 	vec2 flat_direction = vec2(direction.x, direction.y);
 	vec2 flat_sun = vec2(sun_direction.x, sun_direction.y);
 	float cosine = dot(flat_direction, flat_sun) * inversesqrt(max(dot(flat_direction, flat_direction) * dot(flat_sun, flat_sun), 1e-18));
-	float column = sqrt(sqrt(clamp(0.5 - 0.5 * cosine, 0.0, 1.0)));
-	return vec2((0.5 + column * (SKY_TABLE_SIZE.x - 1.0)) / SKY_TABLE_SIZE.x, (rise > 0.0 ? row : rows + row) / SKY_TABLE_SIZE.y);
+	return sky_table_at(horizon, direction.z, direction.z > horizon, cosine);
 }
 
 // The inverse, for the centre of a texel: x sine of the elevation, y cosine of the azimuth from the sun.

@@ -38,6 +38,7 @@ vec3 view_layer(view_parts p, int layer)
 	case 10: return colour_of_bands(p.air);
 	case 11: return p.transmittance;
 	case 12: return vec3(p.optical_thickness);
+	case 14: return vec3(0.0); // standard error: nothing here is left to chance
 	default: return vec3(p.distance);
 	}
 }

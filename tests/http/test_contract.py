@@ -16,6 +16,8 @@ CONTRACT = yaml.safe_load((ROOT / "openapi.yaml").read_text())
 SECTIONS = CONTRACT["components"]["schemas"]["Scene"]["properties"]
 MEMBERS = [(section, name, schema) for section, inner in SECTIONS.items() for name, schema in inner["properties"].items()]
 
+OF_THE_REFERENCE = {"samples", "time_budget_ms", "seed", "partial"}
+
 # What a probe needs beside it so that only the member itself can be wrong.
 BESIDE = {
     ("sun", "time"): {"sun": {"latitude_deg": 40, "longitude_deg": 0}},
@@ -25,9 +27,10 @@ BESIDE = {
     ("dsd", "n0_per_cm3"): {"dsd": {"effective_radius_um": 5}},
     ("dsd", "effective_radius_um"): {"dsd": {"n0_per_cm3": 10}},
     ("ground", "albedo"): {"ground": {"type": "lambert"}},
-    ("output", "layers"): {"output": {"format": "exr"}},
+    ("output", "layers"): {"output": {"format": "exr"}, "model": {"name": "reference"}},
     ("camera", "position_m"): {"clouds": {"type": "none"}},
     ("camera", "face"): {"camera": {"projection": "cubemap"}},
+    **{("model", name): {"model": {"name": "reference"}, "output": {"width": 16, "height": 16}} for name in OF_THE_REFERENCE},
 }
 # On these bounds another rule speaks: the sun below the horizon, the range of the effective radius.
 ELSEWHERE = {("sun", "latitude_deg"), ("sun", "longitude_deg"), ("dsd", "characteristic_radius_um")}
@@ -110,6 +113,8 @@ def test_default(daemon, section, name, schema):
     if "default" not in schema:
         return
     beside = {"ground": {"type": "lambert"}} if (section, name) == ("ground", "albedo") else {}
+    if section == "model" and name in OF_THE_REFERENCE:
+        beside = {"model": {"name": "reference"}}
     said = json.loads(json.dumps(beside))
     said.setdefault(section, {})[name] = schema["default"]
     plain = daemon.head("/v1/render?" + query_of(beside))
@@ -121,7 +126,7 @@ def test_canonical_scene_has_the_members_of_the_contract(daemon, read_image):
     scene = {"ground": {"type": "lambert"}, "output": {"width": 16, "height": 16}}
     embedded = json.loads(read_image(daemon.render(scene).body)[1].getattribute("stratus:scene"))
     for section, inner in SECTIONS.items():
-        with_default = {name for name, schema in inner["properties"].items() if "default" in schema}
+        with_default = {name for name, schema in inner["properties"].items() if "default" in schema} - (OF_THE_REFERENCE if section == "model" else set())
         assert set(embedded[section]) == with_default
     assert set(embedded) == set(SECTIONS)
 
@@ -166,6 +171,9 @@ EXAMPLES = {
 }
 
 
+BODIES = {"/v1/compare": {"scene": {"output": {"width": 32, "height": 24}}, "variants": [{}, {"model": {"shading": "paper"}}]}}
+
+
 METHODS = ("get", "head", "post", "put", "delete")
 
 
@@ -186,7 +194,8 @@ def test_every_call_answers(daemon, example_asset, path, method):
         assert all(answer.headers[header] for header in described["204"].get("headers", {}))
         return
     if method == "post":
-        answer = daemon.render({"output": {"width": 16, "height": 16}})
+        body = BODIES.get(path, {"output": {"width": 16, "height": 16}})
+        answer = daemon.request("POST", path, json.dumps(body), {"Content-Type": "application/json"})
     else:
         answer = daemon.request(method.upper(), target)
     assert answer.status == 200
@@ -196,11 +205,32 @@ def test_every_call_answers(daemon, example_asset, path, method):
     if "$ref" in response:
         response = CONTRACT["components"]["responses"][response["$ref"].rsplit("/", 1)[1]]
     assert answer.headers["Content-Type"].split(";")[0] in response["content"]
-    for header in response.get("headers", {}):
-        assert answer.headers[header], header
+    for header, about in response.get("headers", {}).items():
+        assert answer.headers[header] or about.get("required") is False, header
     schema = response["content"][answer.headers["Content-Type"].split(";")[0]].get("schema")
     if schema:
         assert_conforms(answer.json, schema)
+
+
+@pytest.mark.parametrize("path", CONTRACT["paths"])
+def test_methods(daemon, path):
+    """The contract lists the methods that an address takes, no more and no fewer."""
+    allowed = daemon.request("PATCH", EXAMPLES.get(path, path)).headers["Allow"]
+    assert set(allowed.split(", ")) == {method.upper() for method in CONTRACT["paths"][path] if method in METHODS}
+
+
+@pytest.mark.parametrize("path", CONTRACT["paths"])
+def test_unknown_query(daemon, example_asset, path):
+    """Members that a call does not know are refused, whatever the method; what is no call leaves its query unread."""
+    target = EXAMPLES.get(path, path)
+    target += ("&" if "?" in target else "?") + "x=1"
+    for method in [name for name in ("GET", "HEAD", "DELETE") if name.lower() in CONTRACT["paths"][path]]:
+        answer = daemon.request(method, target)
+        assert answer.status == (422 if path.startswith("/v1/") else 200), method
+        if method != "HEAD" and answer.status == 422:
+            assert answer.pointers == {"/x"}
+    if "put" in CONTRACT["paths"][path]:
+        assert daemon.request("PUT", target, PNG).pointers == {"/x"}
 
 
 def names_of(value):

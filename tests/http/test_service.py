@@ -218,7 +218,7 @@ def test_rules_across_members(daemon, scene, pointer):
 @pytest.mark.parametrize(
     "section, member, values",
     [
-        ("model", "name", ["reference", "volume", "planar"]),
+        ("model", "name", ["volume", "planar"]),
     ],
 )
 def test_later_members_say_so(daemon, section, member, values):

@@ -157,6 +157,7 @@ static sampler2D probes, phase_table, event_table, slab_table;
 static sampler3D slab_slices;
 static sampler2D transmittance_table, sky_total, sky_near, air_to_layer, air_to_end;
 static sampler2D ground_received, cloud_received, ground_irradiance, seen_place, seen_light;
+static sampler2D path_tops, path_bounds, phase_inverse, forward_chains, sky_at_layer, sky_at_ground;
 static sampler2D diffuse_0, diffuse_1, diffuse_2, diffuse_3, diffuse_4, diffuse_5, diffuse_6, diffuse_7;
 
 /* The sun's disc, of the box in the block's member sun_disc_box. */

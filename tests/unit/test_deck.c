@@ -4,6 +4,7 @@
 #include "tests/validate/deck.h"
 
 #include "renderer/log.h"
+#include "renderer/scene_map.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -47,6 +48,24 @@ static void deck_against_the_solver(void **state)
 				assert_true(ground < 0.005);
 				assert_true(base < 0.005);
 			}
+}
+
+/* With the radiosity off the ground has its first light, and the base gets nothing of it: as over black ground. */
+static void without_radiosity_nothing_comes_back(void **state)
+{
+	(void)state;
+	struct scene scene = deck_scene(deck, 12, 50, 0.7), black = scene;
+	struct deck_light found, wanted;
+	scene.radiosity.enabled = false;
+	for (int band = 0; band < BAND_COUNT; band++)
+		black.ground.albedo[band] = 1e-6;
+	assert_true(deck_measure(deck, &scene, &found));
+	deck_expect(deck, &black, &found, &wanted); /* under the sky that the bright ground makes */
+	assert_true(worst_of(found.ground, wanted.ground) < 0.005);
+	assert_true(worst_of(found.base[1], wanted.base[1]) < 0.005);
+	scene.radiosity.enabled = true;
+	assert_true(deck_measure(deck, &scene, &found));
+	assert_true(worst_of(found.ground, wanted.ground) > 0.5);
 }
 
 static double element(const json_t *row, size_t i)
@@ -196,14 +215,69 @@ static void ground_under_nothing_has_its_clear_sky(void **state)
 		}
 }
 
+/* --- grounds ----------------------------------------------------------------------------------------------------------------------- */
+
+/* A map of patches far smaller than the base is high: all reflect the same light. */
+static struct scene_map *patches_create(void)
+{
+	enum { SIDE = 128 };
+	static const unsigned char hash[SCENE_MAP_HASH_BYTES] = {1};
+	struct scene_map *map = scene_map_create(SIDE, SIDE, 3, hash);
+	assert_non_null(map);
+	for (int i = 0; i < 3 * SIDE * SIDE; i++)
+		map->values[i] = 0.1f + 0.2f * (float)((i / 3 * 7 + i % 3 + i / (3 * SIDE)) % 4);
+	scene_map_seal(map);
+	return map;
+}
+
+/* What pictures show of a ground, over what the radiosity says that it receives times its mean albedo. */
+static double shown_over_received(struct scene scene, enum ground_type type, const struct scene_map *map, int band)
+{
+	struct deck_radiosity light;
+	double up[BAND_COUNT];
+	scene.ground.type = type;
+	scene.ground.map.map = map;
+	assert_true(deck_radiosity(deck, &scene, &light));
+	assert_true(deck_measure_ground(deck, &scene, 128, up));
+	return up[band] / (light.ground_albedo[band] * (light.ground_diffuse[band] + light.ground_direct[band]));
+}
+
+/* Over that of an even ground, whose part is the air between. The sea mirrors its sky and is no such ground; of sea ice this deck has only
+ * a coast. */
+static void grounds_send_up_what_they_receive(void **state)
+{
+	(void)state;
+	static const enum ground_type types[] = {GROUND_GRASS, GROUND_COUNTRY, GROUND_SOIL, GROUND_SAND, GROUND_SNOW};
+	static const double cases[][2] = {{0.02, 30}, {0.02, 70}, {20, 50}}; /* optical thickness, zenith angle of the sun */
+	struct scene_map *map = patches_create();
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct scene scene = deck_scene(deck, cases[i][0], cases[i][1], 0.4);
+		scene.clouds.base_m = 1000;
+		const double even = shown_over_received(scene, GROUND_LAMBERT, NULL, 1);
+		const double patches = shown_over_received(scene, GROUND_LAMBERT, map, 1) / even;
+		print_message("tau %5.2f, sun zenith %2.0f: map %.4f", cases[i][0], cases[i][1], patches);
+		assert_true(even > 0.97 && even < 1);
+		assert_float_equal(patches, 1, 0.01);
+		for (size_t k = 0; k < sizeof types / sizeof *types; k++) {
+			const double shown = shown_over_received(scene, types[k], NULL, 1) / even;
+			print_message(", %s %.4f", scene_ground_type_names[types[k]], shown);
+			assert_float_equal(shown, 1, 0.01);
+		}
+		print_message("\n");
+	}
+	scene_map_release(map);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(deck_against_the_solver),
+		cmocka_unit_test(without_radiosity_nothing_comes_back),
 		cmocka_unit_test(deck_against_discrete_ordinates),
 		cmocka_unit_test(light_is_kept),
 		cmocka_unit_test(snow_brightens_the_sky_about_twice),
 		cmocka_unit_test(transition_is_as_wide_as_the_base_is_high),
+		cmocka_unit_test(grounds_send_up_what_they_receive),
 		cmocka_unit_test(ground_under_nothing_has_its_clear_sky),
 	};
 	const char *path = getenv("STRATUS_KERNEL");
@@ -211,7 +285,7 @@ int main(void)
 	if (!kernel)
 		return 1;
 	log_set_level(LOG_ERROR);
-	deck = deck_create(kernel, true);
+	deck = deck_create(kernel, DECK_UNIFORM);
 	const int failed = deck ? cmocka_run_group_tests(tests, NULL, NULL) : 77;
 	deck_destroy(deck);
 	kernel_destroy(kernel);

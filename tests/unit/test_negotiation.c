@@ -53,6 +53,35 @@ static void test_accept(void **state)
 	}
 }
 
+static void test_choice_of_types(void **state)
+{
+	(void)state;
+	static const char *const types[] = {"application/json", "image/png", "image/x-exr", NULL};
+	static const struct {
+		const char *accept;
+		int chosen;
+	} cases[] = {
+		{NULL, 0},
+		{"", 0},
+		{"*/*", 0},
+		{"application/*", 0},
+		{"image/*", 1},
+		{"image/x-exr", 2},
+		{"image/x-exr, */*", 2},
+		{"image/*, image/x-exr", 2},
+		{"image/x-exr;q=0.3, */*", 0},
+		{"image/png, application/json", 0},
+		{"image/png;q=0.8, application/json;q=0.7", 1},
+		{"application/json;q=0, image/*;q=0.1", 1},
+		{"text/html", NONE},
+		{"*/*;q=0", NONE},
+		{"applicationx/*, image", NONE},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+		if (negotiation_choose_type(cases[i].accept, types) != cases[i].chosen)
+			fail_msg("Accept: %s gives %d", cases[i].accept, negotiation_choose_type(cases[i].accept, types));
+}
+
 static void test_content_type(void **state)
 {
 	(void)state;
@@ -112,10 +141,8 @@ static void test_server_timing(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_accept),
-		cmocka_unit_test(test_content_type),
-		cmocka_unit_test(test_entity_tags),
-		cmocka_unit_test(test_server_timing),
+		cmocka_unit_test(test_accept),      cmocka_unit_test(test_choice_of_types), cmocka_unit_test(test_content_type),
+		cmocka_unit_test(test_entity_tags), cmocka_unit_test(test_server_timing),
 	};
 	return cmocka_run_group_tests_name("negotiation", tests, NULL, NULL);
 }

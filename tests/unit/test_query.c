@@ -94,6 +94,20 @@ static void test_refusals(void **state)
 	assert_refused("model.shading=toon", "/model/shading");
 }
 
+static void test_none_taken(void **state)
+{
+	(void)state;
+	problem_finish(&problem);
+	assert_true(scene_query_refuse(NULL, &problem) && scene_query_refuse("", &problem) && scene_query_refuse("&", &problem));
+	assert_false(scene_query_refuse("sun.elevation_deg=1&y", &problem));
+	assert_int_equal(problem.kind, PROBLEM_INVALID);
+	assert_int_equal(problem.error_count, 2);
+	assert_string_equal(problem.errors[0].pointer, "/sun/elevation_deg");
+	problem_finish(&problem);
+	assert_false(scene_query_refuse("%", &problem));
+	assert_int_equal(problem.kind, PROBLEM_BAD_REQUEST);
+}
+
 static void test_too_many(void **state)
 {
 	(void)state;
@@ -107,10 +121,8 @@ static void test_too_many(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_members),
-		cmocka_unit_test(test_decoding),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_too_many),
+		cmocka_unit_test(test_members),    cmocka_unit_test(test_decoding), cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_none_taken), cmocka_unit_test(test_too_many),
 	};
 	return cmocka_run_group_tests_name("query", tests, NULL, forget);
 }

@@ -98,6 +98,12 @@ static bool suits(const struct scene_field *field, bool map)
 	return field->type == FIELD_ASSET ? map : !(map && either && name_index(procedural, field->name) >= 0);
 }
 
+static bool is_sampling(const struct scene_field *field)
+{
+	static const char *const sampling[] = {"samples", "time_budget_ms", "seed", "partial", NULL};
+	return strcmp(field->section, "model") == 0 && name_index(sampling, field->name) >= 0;
+}
+
 /* A random scene that obeys the rules across members; the others are thrown away. */
 static bool random_scene(struct scene *scene)
 {
@@ -109,6 +115,8 @@ static bool random_scene(struct scene *scene)
 			   is_angle = strstr(field->name, "elevation") || strstr(field->name, "azimuth");
 		const bool left_out = of_sun ? is_angle == by_time : random_bits() % 3 == 0;
 		if (field->flags & (FIELD_INPUT_ONLY | FIELD_LATER) || is_out_of_place(field, panorama) || !suits(field, map) || left_out)
+			continue;
+		if (is_sampling(field) && input.scene.model.name != MODEL_REFERENCE)
 			continue;
 		json_t *value = random_value(field);
 		scene_json_read_field(field, value, "/x", &input, &problem);

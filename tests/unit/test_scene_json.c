@@ -220,6 +220,26 @@ static void test_later(void **state)
 	assert_later("{\"model\":{\"name\":\"volume\"}}", "/model/name");
 }
 
+static void test_reference(void **state)
+{
+	(void)state;
+	assert_valid("{\"model\":{\"name\":\"reference\",\"samples\":65536,\"time_budget_ms\":600000,\"seed\":4294967295,\"partial\":true},"
+		     "\"output\":{\"format\":\"exr\",\"layers\":[\"color\",\"standard_error\"]}}");
+	assert_true(input.scene.model.samples == 65536 && input.scene.model.partial && input.scene.model.time_budget_ms == 600000);
+	assert_int_equal(input.scene.model.seed, 4294967295u);
+	/* What it has no use for may stand beside it, and makes no other scene. */
+	assert_valid("{\"model\":{\"name\":\"reference\",\"shading\":\"paper\"},\"radiosity\":{\"enabled\":false,\"max_passes\":3}}");
+	const struct scene beside = input.scene;
+	assert_valid("{\"model\":{\"name\":\"reference\"}}");
+	assert_memory_equal(&beside, &input.scene, sizeof beside);
+	assert_true(input.scene.model.samples == 64 && input.scene.model.seed == 1 && !input.scene.model.partial);
+	assert_refused("{\"model\":{\"samples\":64}}", "/model/samples");
+	assert_refused("{\"model\":{\"name\":\"slab\",\"partial\":false}}", "/model/partial");
+	assert_refused("{\"model\":{\"name\":\"reference\",\"samples\":0}}", "/model/samples");
+	assert_refused("{\"output\":{\"format\":\"exr\",\"layers\":[\"standard_error\"]}}", "/output/layers");
+	assert_refused("{\"model\":{\"name\":\"none\",\"samples\":64}}", "/model/name");
+}
+
 static void test_maps(void **state)
 {
 	(void)state;
@@ -331,19 +351,13 @@ static void test_presets(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_defaults),
-		cmocka_unit_test(test_members),
-		cmocka_unit_test(test_wrong_members),
-		cmocka_unit_test(test_repeated_and_huge),
-		cmocka_unit_test(test_all_at_once),
-		cmocka_unit_test(test_across_members),
-		cmocka_unit_test(test_panoramas),
-		cmocka_unit_test(test_sun_by_time),
-		cmocka_unit_test(test_later),
-		cmocka_unit_test(test_maps),
-		cmocka_unit_test(test_not_json),
-		cmocka_unit_test(test_nesting),
-		cmocka_unit_test(test_bounds_of_a_problem),
+		cmocka_unit_test(test_defaults),      cmocka_unit_test(test_members),
+		cmocka_unit_test(test_wrong_members), cmocka_unit_test(test_repeated_and_huge),
+		cmocka_unit_test(test_all_at_once),   cmocka_unit_test(test_across_members),
+		cmocka_unit_test(test_panoramas),     cmocka_unit_test(test_sun_by_time),
+		cmocka_unit_test(test_later),         cmocka_unit_test(test_reference),
+		cmocka_unit_test(test_maps),          cmocka_unit_test(test_not_json),
+		cmocka_unit_test(test_nesting),       cmocka_unit_test(test_bounds_of_a_problem),
 		cmocka_unit_test(test_presets),
 	};
 	return cmocka_run_group_tests_name("scene_json", tests, NULL, forget);

@@ -35,6 +35,7 @@ enum tally_id {
 	TALLY_DECK_BASE,
 	TALLY_DECK_REFERENCE,
 	TALLY_DECK_BALANCE,
+	TALLY_PUFFED_BALANCE,
 	TALLY_WATER_SKY, /* relative */
 	TALLY_COLD,      /* ms: least of several, of one distribution */
 	TALLY_DISK,
@@ -45,6 +46,12 @@ enum tally_id {
 	TALLY_SKY_PHOTONS_RELATIVE,
 	TALLY_SKY_COLOUR, /* distance of chromaticities x, y */
 	TALLY_SKY_LUMINANCE,
+	TALLY_PATHS_LAYER, /* the reference model: over 3 standard errors; relative */
+	TALLY_PATHS_FLUX,
+	TALLY_PATHS_ERROR,
+	TALLY_PATHS_THIN, /* relative, these two */
+	TALLY_PATHS_FURNACE,
+	TALLY_PATHS_TIME, /* s */
 	TALLY_COUNT
 };
 
@@ -73,7 +80,7 @@ struct bound {
 	const char *unit; /* "%" shows it times 100 */
 };
 
-enum { BOUND_COUNT = 37 };
+enum { BOUND_COUNT = 44 };
 extern const struct bound bounds[BOUND_COUNT];
 
 enum verdict { VERDICT_REACHED, VERDICT_TOLERATED, VERDICT_BROKEN };

@@ -1,5 +1,6 @@
 #include "tests/validate/deck.h"
 
+#include "renderer/camera.h"
 #include "renderer/embed.h"
 #include "renderer/gl/context.h"
 #include "renderer/optics/quadrature.h"
@@ -15,11 +16,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PICTURE_SIDE = 16, LAYERS = 9, VIEW_NODES = 12, AZIMUTHS = 12 };
+enum { PICTURE_SIDE = 16, LAYERS = 9, VIEW_NODES = 12, AZIMUTHS = 12, FACE_SIDE = 48, FACES = 6 };
 
 #define DEGREE (M_PI / 180)
 
 const double deck_views[2] = {0, 30};
+
+/* Above the mean top and the puffs on it, and above what grows. */
+static const double deck_clearance_m = 25;
 
 /* All that the layer sends to the camera but for what is seen through it; then what is. */
 static const enum layer layers[LAYERS] = {LAYER_ORDER0,       LAYER_ORDER1, LAYER_ORDER2, LAYER_MULTIPLE, LAYER_CLOUD_SKY,
@@ -52,17 +56,19 @@ struct made {
 
 /* --- shaders --------------------------------------------------------------------------------------------------------------------- */
 
-/* What is put at the beginning of functions. */
+/* What is put behind a text, the beginning of a function or of the file, in decks of kinds up to the last. */
 static const struct {
+	enum deck_kind last;
 	const char *file, *head, *text;
 } replacements[] = {
-	{"shaders/lib/field.glsl", "float field_thickness_of(float density, float footprint)\n{\n",
+	{DECK_PUFFED, "shaders/lib/field.glsl", "float field_thickness_of(float density, float footprint)\n{\n",
 	 "\tif (cloud_layer.y > 0.0)\n\t\treturn cloud_layer.y;\n"},
-	{"shaders/lib/ground_paint.glsl", "vec3 ground_sea_ice(vec2 p, float tile)\n{\n",
+	{DECK_UNIFORM, "shaders/passes/height_view.glsl", "", "#undef HEIGHT_NEAR\n#define HEIGHT_NEAR 0\n"},
+	{DECK_PUFFED, "shaders/lib/ground_paint.glsl", "vec3 ground_sea_ice(vec2 p, float tile)\n{\n",
 	 "\tif (tile > 0.0)\n\t\treturn p.x < 0.5 ? ALBEDO_SNOW : ALBEDO_WATER;\n"},
 };
 
-static bool write_shader(const struct deck *deck, const struct embedded_file *file)
+static bool write_shader(const struct deck *deck, enum deck_kind kind, const struct embedded_file *file)
 {
 	char path[512];
 	snprintf(path, sizeof path, "%s/%s", deck->folder, strchr(file->name, '/') + 1);
@@ -72,7 +78,7 @@ static bool write_shader(const struct deck *deck, const struct embedded_file *fi
 	size_t done = 0;
 	bool ok = true;
 	for (size_t i = 0; i < sizeof replacements / sizeof *replacements; i++) {
-		if (strcmp(file->name, replacements[i].file) != 0)
+		if (kind > replacements[i].last || strcmp(file->name, replacements[i].file) != 0)
 			continue;
 		const char *at = strstr(file->data, replacements[i].head);
 		if (!at) {
@@ -88,7 +94,7 @@ static bool write_shader(const struct deck *deck, const struct embedded_file *fi
 	return fclose(out) == 0 && ok;
 }
 
-static bool write_shaders(struct deck *deck)
+static bool write_shaders(struct deck *deck, enum deck_kind kind)
 {
 	static const char *const folders[] = {"lib", "passes"};
 	char path[512];
@@ -99,7 +105,7 @@ static bool write_shaders(struct deck *deck)
 		ok = mkdir(path, 0700) == 0;
 	}
 	for (const struct embedded_file *file = shader_files; ok && file->name; file++)
-		ok = write_shader(deck, file);
+		ok = write_shader(deck, kind, file);
 	return ok;
 }
 
@@ -121,15 +127,16 @@ static void remove_shaders(struct deck *deck)
 
 /* --- life ------------------------------------------------------------------------------------------------------------------------ */
 
-static bool stages_init(struct deck *deck, bool uniform)
+static bool stages_init(struct deck *deck, enum deck_kind kind)
 {
-	const struct pass_compiler compiler = {.kind = PASS_FRAGMENT, .shader_dir = uniform ? deck->folder : NULL};
+	const struct pass_compiler compiler = {.kind = PASS_FRAGMENT, .shader_dir = kind == DECK_AS_IT_IS ? NULL : deck->folder};
 	ground_stage_init(&deck->ground, &compiler);
-	return (!uniform || write_shaders(deck)) && sky_stage_init(&deck->sky, &compiler) && field_stage_init(&deck->field, &compiler) &&
-	       radiosity_stage_init(&deck->radiosity, &compiler) && view_stage_init(&deck->view, &compiler);
+	return (kind == DECK_AS_IT_IS || write_shaders(deck, kind)) && sky_stage_init(&deck->sky, &compiler) &&
+	       field_stage_init(&deck->field, &compiler) && radiosity_stage_init(&deck->radiosity, &compiler) &&
+	       view_stage_init(&deck->view, &compiler);
 }
 
-struct deck *deck_create(const struct kernel *kernel, bool uniform)
+struct deck *deck_create(const struct kernel *kernel, enum deck_kind kind)
 {
 	const struct scene_dsd dsd = scene_default().dsd;
 	struct deck *deck = calloc(1, sizeof *deck);
@@ -141,7 +148,7 @@ struct deck *deck_create(const struct kernel *kernel, bool uniform)
 	deck->context.cache = cache_create(64u << 20);
 	deck->optics = optics_create(kernel, &dsd, OPTICS_MIE);
 	deck->slab = deck->optics ? slab_solve(deck->optics, 2) : NULL;
-	if (!deck->droplets || !deck->context.cache || !deck->slab || !stages_init(deck, uniform)) {
+	if (!deck->droplets || !deck->context.cache || !deck->slab || !stages_init(deck, kind)) {
 		deck_destroy(deck);
 		return NULL;
 	}
@@ -256,6 +263,17 @@ static void mean_bands(const struct texture *picture, double bands[BAND_COUNT])
 	bands_of(rgb, bands);
 }
 
+static struct view_inputs inputs_of(const struct made *made)
+{
+	return (struct view_inputs){.ground = &made->ground,
+				    .droplets = made->droplets,
+				    .slab_rows = made->slab_rows,
+				    .slab_slices = made->slab_slices,
+				    .sky = &made->sky,
+				    .field = &made->field,
+				    .light = &made->light};
+}
+
 /* A picture's mean radiances by layer. */
 static bool look(struct deck *deck, struct scene scene, double height, double azimuth, double elevation, struct made *made,
 		 double bands[LAYERS][BAND_COUNT])
@@ -265,9 +283,7 @@ static bool look(struct deck *deck, struct scene scene, double height, double az
 	scene.camera.azimuth_deg = fmod(azimuth + 720, 360);
 	scene.camera.elevation_deg = elevation;
 	bool ok = make(deck, &scene, made);
-	const struct view_inputs inputs = {
-		&made->ground, made->droplets, made->slab_rows, made->slab_slices, &made->sky, &made->field, &made->light, NULL, NULL,
-		NULL};
+	const struct view_inputs inputs = inputs_of(made);
 	if (ok) {
 		stage_upload_block(&deck->context);
 		ok = view_stage_run(&deck->view, &deck->context, &scene, &inputs, layers, LAYERS, NULL, NULL, pictures);
@@ -320,6 +336,72 @@ bool deck_measure_leaving(struct deck *deck, const struct scene *scene, double l
 	return true;
 }
 
+/* Irradiance of a horizontal plane from below by what the pictures of a cubemap show. */
+static void flux_of(const struct scene *scene, const struct texture *picture, double flux[BAND_COUNT])
+{
+	static float texels[FACES * FACE_SIDE * FACE_SIDE][4];
+	double rgb[3] = {0};
+	stage_read_texture(picture, 0, 4, &texels[0][0]);
+	for (int face = 0; face < FACES; face++) {
+		const struct camera_view view = camera_view_of(scene, face);
+		for (int i = 0; i < FACE_SIDE * FACE_SIDE; i++) {
+			const int column = i % FACE_SIDE, row = view.first_row + i / FACE_SIDE;
+			double direction[3];
+			camera_direction(&view, (double[]){column + 0.5, row + 0.5}, direction);
+			const double weight = fmax(0, -direction[2]) * camera_pixel_solid_angle(&view, column, row);
+			for (int channel = 0; channel < 3; channel++)
+				rgb[channel] += weight * (double)texels[face * FACE_SIDE * FACE_SIDE + i][channel];
+		}
+	}
+	bands_of(rgb, flux);
+}
+
+/* What comes up at a height, in one layer, as the mean over so many places. */
+static bool look_down_around(struct deck *deck, const struct scene *scene, double height, enum layer layer, int places,
+			     double flux[BAND_COUNT])
+{
+	struct scene there = *scene;
+	there.camera.projection = PROJECTION_CUBEMAP;
+	there.camera.face = FACE_ALL;
+	there.camera.position_m[2] = height;
+	there.output.width = FACE_SIDE;
+	there.output.height = FACES * FACE_SIDE;
+	memset(flux, 0, BAND_COUNT * sizeof *flux);
+	for (int i = 0; i < places; i++) {
+		const struct texture *picture;
+		struct made made;
+		double here[BAND_COUNT];
+		/* Places that keep apart: multiples of the golden section and of the root of 2. */
+		there.camera.position_m[0] = scene->clouds.tile_m * fmod(0.6180340 * i, 1);
+		there.camera.position_m[1] = scene->clouds.tile_m * fmod(0.4142136 * i, 1);
+		bool ok = make(deck, &there, &made);
+		if (ok) {
+			const struct view_inputs inputs = inputs_of(&made);
+			stage_upload_block(&deck->context);
+			ok = view_stage_run(&deck->view, &deck->context, &there, &inputs, &layer, 1, NULL, NULL, &picture);
+		}
+		if (ok)
+			flux_of(&there, picture, here);
+		droplets_release(&deck->context);
+		if (!ok)
+			return false;
+		for (int band = 0; band < BAND_COUNT; band++)
+			flux[band] += here[band] / places;
+	}
+	return true;
+}
+
+bool deck_measure_leaving_around(struct deck *deck, const struct scene *scene, int places, double leaving[BAND_COUNT])
+{
+	const double height = scene->clouds.base_m + scene->clouds.thickness_m + deck_clearance_m;
+	return look_down_around(deck, scene, height, LAYER_COLOR, places, leaving);
+}
+
+bool deck_measure_ground(struct deck *deck, const struct scene *scene, int places, double leaving[BAND_COUNT])
+{
+	return look_down_around(deck, scene, 0.9 * scene->clouds.base_m, LAYER_GROUND, places, leaving);
+}
+
 bool deck_measure_luminance(struct deck *deck, const struct scene *scene, const double position_m[3], double azimuth_deg,
 			    double elevation_deg, double *luminance)
 {
@@ -348,6 +430,7 @@ bool deck_radiosity(struct deck *deck, const struct scene *scene, struct deck_ra
 	for (int band = 0; band < BAND_COUNT; band++) {
 		radiosity->ground_diffuse[band] = made.light.ground_diffuse[band];
 		radiosity->ground_direct[band] = made.light.ground_direct[band];
+		radiosity->ground_albedo[band] = made.ground.mean[band];
 		radiosity->sky_ground[band] = made.sky.diffuse_ground[band];
 		radiosity->sun_ground[band] = made.sky.sun_ground[band] * fmax(0, sin(scene->sun.elevation_deg * DEGREE));
 	}

@@ -40,7 +40,7 @@ static void print_curve(FILE *page, const char *name, const struct deck_radiosit
 
 void figure_passes(struct validation *validation)
 {
-	struct deck *deck = deck_create(validation->kernel, false);
+	struct deck *deck = deck_create(validation->kernel, DECK_AS_IT_IS);
 	struct deck_radiosity light[CURVES];
 	require(deck, "no OpenGL context");
 	fprintf(validation->page,

@@ -43,7 +43,7 @@ static double transition(struct deck *deck, const struct scene *scene)
 void figure_water_sky(struct validation *validation)
 {
 	static const double taus[] = {10, 20, 40}, bases[] = {400, 1000};
-	struct deck *deck = deck_create(validation->kernel, true);
+	struct deck *deck = deck_create(validation->kernel, DECK_UNIFORM);
 	require(deck, "no deck");
 	fprintf(validation->page,
 		"\n## Water sky\n\n"

@@ -88,7 +88,8 @@ static const struct part {
 	void (*run)(struct validation *validation);
 } parts[] = {
 	/* Times first, while nothing else of this program has filled the caches. */
-	{"times", validate_times},     {"reference", validate_reference},
+	{"times", validate_times},     {"data", validate_reference},
+	{"reference", validate_paths},
 	{"spheres", validate_spheres}, {"conservation", validate_conservation},
 	{"lookup", validate_lookup},   {"photons", validate_photons},
 	{"sky", validate_sky},         {"ground", validate_ground},

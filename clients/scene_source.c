@@ -1,0 +1,36 @@
+#include "clients/scene_source.h"
+
+#include "clients/preset_list.h"
+#include "clients/scene_edit.h"
+
+static int take_preset(const struct client *client, const char *name, json_t **scene)
+{
+	json_t *presets;
+	int status = preset_list_fetch(client, &presets);
+	if (status == CLIENT_OK) {
+		*scene = json_incref(preset_list_find(presets, name));
+		status = *scene ? CLIENT_OK : CLIENT_USAGE;
+	}
+	json_decref(presets);
+	return status;
+}
+
+int scene_source_load(const struct client *client, const struct scene_source *source, json_t **scene)
+{
+	int status = CLIENT_OK;
+	*scene = NULL;
+	if (source->preset)
+		status = take_preset(client, source->preset, scene);
+	else
+		*scene = source->file ? scene_read(source->file) : json_object();
+	if (status == CLIENT_OK && !*scene)
+		status = CLIENT_USAGE;
+	for (int i = 0; status == CLIENT_OK && i < source->set_count; i++)
+		if (!scene_set(*scene, source->sets[i]))
+			status = CLIENT_USAGE;
+	if (status != CLIENT_OK) {
+		json_decref(*scene);
+		*scene = NULL;
+	}
+	return status;
+}

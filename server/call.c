@@ -1,0 +1,117 @@
+#include "server/call.h"
+
+#include "server/clock.h"
+#include "server/response.h"
+#include "server/service.h"
+
+#include <stdlib.h>
+
+bool call_tag(const struct service *service, const char *call, char *question, char tag[static ENTITY_TAG_SIZE])
+{
+	struct text tagged = {0};
+	text_printf(&tagged, "%s|%s|%s", call, question ? question : "", service->pixel_version);
+	const bool good = question && !tagged.failed;
+	if (good)
+		entity_tag_of(tagged.data, tagged.length, tag);
+	free(question);
+	text_finish(&tagged);
+	return good;
+}
+
+bool call_answer_at_once(struct request *request, const char *tag, call_sender *send, enum MHD_Result *result)
+{
+	/* What is kept of an answer is kept under its address, which a POST has none of (RFC 9111, 2). */
+	if (!request->is_post && entity_tag_matches(request_header(request, "If-None-Match"), tag))
+		*result = send(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
+	else if (request->is_head)
+		*result = send(request, MHD_HTTP_OK, response_create_unsized());
+	else
+		return false;
+	return true;
+}
+
+enum MHD_Result call_send_json(struct request *request, unsigned status, struct MHD_Response *response, const char *tag,
+			       const char *cache_control)
+{
+	if (status == MHD_HTTP_OK)
+		response_set(response, "Content-Type", "application/json");
+	response_set(response, "ETag", tag);
+	response_set(response, "Cache-Control", cache_control);
+	return response_send(request, status, response);
+}
+
+bool call_is_abandoned(const struct request *request)
+{
+	return request->service->giving_up || request_is_abandoned(request);
+}
+
+enum call_outcome call_reason_to_stop(const struct request *request, double deadline_ms)
+{
+	if (clock_now_ms() >= deadline_ms)
+		return CALL_EXPIRED;
+	if (request->service->giving_up)
+		return CALL_STOPPED;
+	return request_is_abandoned(request) ? CALL_ABANDONED : CALL_OK;
+}
+
+void call_end_render(struct request *request, const struct render_job *job)
+{
+	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
+						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
+						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
+						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
+	if (job->outcome != RENDER_OUTCOME_OK)
+		metrics_count_end(request->service->metrics, ends[job->outcome]);
+	request_resume(request);
+}
+
+enum MHD_Result call_refuse_computing(struct request *request)
+{
+	metrics_count_rejection(request->service->metrics, REJECTED_FULL);
+	return response_send_new_problem(request, PROBLEM_COMPUTERS_FULL, "%d such calls are waiting, and no more may.",
+					 request->service->config->queue_length);
+}
+
+enum MHD_Result call_refuse_render(struct request *request)
+{
+	const struct service *service = request->service;
+	if (service->stopping)
+		return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
+	metrics_count_rejection(service->metrics, REJECTED_FULL);
+	return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "%d renders are waiting, and no more may.",
+					 service->config->queue_length);
+}
+
+enum MHD_Result call_send_failure(struct request *request, enum call_outcome outcome, const char *what)
+{
+	switch (outcome) {
+	case CALL_EXPIRED:
+		return response_send_new_problem(request, PROBLEM_DEADLINE, "%s was not ready within the deadline.", what);
+	case CALL_ABANDONED:
+		return MHD_NO;
+	case CALL_STOPPED:
+		return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
+	case CALL_FAILED:
+	case CALL_OK:
+		break;
+	}
+	return response_send_new_problem(request, PROBLEM_INTERNAL, "%s could not be computed. The log has the reason under %s.", what,
+					 request->id);
+}
+
+enum MHD_Result call_send_render_failure(struct request *request, enum render_outcome outcome, const char *what, const char *size)
+{
+	switch (outcome) {
+	case RENDER_OUTCOME_EXPIRED:
+		return call_send_failure(request, CALL_EXPIRED, what);
+	case RENDER_OUTCOME_ABANDONED:
+		return call_send_failure(request, CALL_ABANDONED, what);
+	case RENDER_OUTCOME_NO_MEMORY:
+		return response_send_new_problem(request, PROBLEM_NO_MEMORY, "The device has no memory for %s now.", size);
+	case RENDER_OUTCOME_FAILED:
+	case RENDER_OUTCOME_OK:
+		break;
+	}
+	return response_send_new_problem(request, PROBLEM_RENDER_FAILED, "%s could not be made. The log has the reason under %s.", what,
+					 request->id);
+}

@@ -1,0 +1,182 @@
+// How a light path finds the sun.
+//
+// Droplets scatter half of all light by less than 5 degrees. Looking from every scattering straight at the sun would find, once in a thousand times, one that scatters into
+// the middle of that peak, and leave a bright speck. So light is sorted by its last scattering beyond the peak, seen from the camera: from there on it goes to the sun by
+// forward scatterings alone, and that rest is drawn from the sun's side, where its directions come of the peak itself. What is left to evaluate is the phase function
+// outside the peak. Only paths that met nothing but forward scatterings (order 0) look at the sun through the peak.
+//
+// Number and places of the forward scatterings are drawn for the cloud that is expected towards the sun, those places a Poisson process on the way; what cloud there
+// really is decides about their weight, and ratio tracking (Novak, Selle and Jarosz 2014, "Residual Ratio Tracking") about what the way lets through beside.
+#ifndef SHADERS_LIB_LIGHT_PATH_SUN
+#define SHADERS_LIB_LIGHT_PATH_SUN
+#include "shaders/lib/light_path.glsl"
+
+// The table of chains: so many of them, each with so many directions, from the sun's disc (0) on backwards, texel by texel; a row holds 64 chains, each hero has as many rows. x, y: sine
+// from the middle of the sun along two axes; z, w: densities of the next two bands, in turn, over the hero's.
+const int PATH_CHAIN_LENGTH = 16;
+const int PATH_CHAIN_ROWS = 64;
+// The way to the sun is looked at in so many parts, short ones first.
+const int PATH_PARTS = 10;
+// Where no cloud is expected there may be some: share of the forward scatterings looked for beside cloud, and away from it.
+const float PATH_BESIDE = 0.4;
+const float PATH_AWAY = 0.1;
+
+// Where a part begins, over the whole way; and the part at a place.
+float path_part_start(int part)
+{
+	return float(part * (part + 4)) * (1.0 / float(PATH_PARTS * (PATH_PARTS + 4)));
+}
+
+int path_part_at(float way)
+{
+	return min(int(sqrt(4.0 + float(PATH_PARTS * (PATH_PARTS + 4)) * max(way, 0.0)) - 2.0), PATH_PARTS - 1);
+}
+
+bool path_part_cloudy(int cloudy, int part)
+{
+	return ((cloudy >> part) & 1) != 0;
+}
+
+// Share of the forward scatterings in cloud that are looked for in a part.
+float path_part_share(int cloudy, int part)
+{
+	return path_part_cloudy(cloudy, part) ? 1.0 : (((cloudy << 1) >> part) & 5) != 0 ? PATH_BESIDE : PATH_AWAY;
+}
+
+// Draws where the path is scattered next: x of a uniform density over the rest of the ways as they are weighed.
+void path_sun_draw_next(INOUT(light_path) path, float whole)
+{
+	float share = pow(path_random(path), 1.0 / float(max(path.left, 1)));
+	path.weight = mix(whole, path.weight, share);
+	float rest = path.weight;
+	float at = -1.0;
+	for (int i = 0; i < PATH_PARTS; i++) {
+		float from = path_part_start(i);
+		float size = path_part_start(i + 1) - from;
+		float part_share = path_part_share(path.cloudy, i);
+		at = at < 0.0 && rest <= size * part_share ? from + rest / part_share : at;
+		rest -= size * part_share;
+	}
+	path.next = path.left == 0 ? 1e9 : (at < 0.0 ? 1.0 : at) * path.reach;
+}
+
+// The whole way, weighed, over its length.
+float path_sun_whole(int cloudy)
+{
+	float sum = 0.0;
+	for (int i = 0; i < PATH_PARTS; i++)
+		sum += (path_part_start(i + 1) - path_part_start(i)) * path_part_share(cloudy, i);
+	return sum;
+}
+
+vec4 path_sun_texel(light_path path)
+{
+	return texelFetch(forward_chains, path.chain + ivec2(path.left, 0), 0);
+}
+
+vec3 path_sun_direction(light_path path, vec4 texel)
+{
+	vec3 sun = vec3(sun_direction);
+	float s = sun.z < 0.0 ? -1.0 : 1.0;
+	float a = -1.0 / (s + sun.z);
+	float b = sun.x * sun.y * a;
+	vec3 x = vec3(1.0 + s * sun.x * sun.x * a, s * b, -s * sun.x);
+	vec3 y = vec3(b, s + sun.y * sun.y * a, -sun.y);
+	vec2 aside = vec2(texel.x * path.turn.x - texel.y * path.turn.y, texel.x * path.turn.y + texel.y * path.turn.x);
+	return sun * sqrt(max(1.0 - dot(aside, aside), 0.0)) + x * aside.x + y * aside.y;
+}
+
+vec3 path_sun_ratio(light_path path, vec4 texel)
+{
+	return path.hero == 0 ? vec3(1.0, texel.z, texel.w) : path.hero == 1 ? vec3(texel.w, 1.0, texel.z) : vec3(texel.z, texel.w, 1.0);
+}
+
+// How far the layer reaches towards the sun from a place in it, m.
+float path_sun_reach(float height, float mu_sun)
+{
+	float mu = mu_sun < 0.0 ? min(mu_sun, -0.01) : max(mu_sun, 0.01);
+	return max(mu < 0.0 ? (cloud_layer.x - height) / mu : (cloud_layer.x + cloud_layer.y - height) / mu, 0.01);
+}
+
+// Looks at the straight way from a place to the sun: which parts of it lie in cloud.
+int path_sun_look(vec3 place, float height, float mu_sun, float reach)
+{
+	int cloudy = 0;
+	for (int i = 0; i < PATH_PARTS; i++) {
+		float t = 0.5 * (path_part_start(i) + path_part_start(i + 1)) * reach;
+		float over = height - cloud_layer.x + mu_sun * t;
+		cloudy |= over >= 0.0 && over < path_top(place + vec3(sun_direction) * t) ? 1 << i : 0;
+	}
+	return cloudy;
+}
+
+// Begins to look for the sun. place: where the straight way to the sun enters the layer; height above ground, cosine of the sun there. The number of forward
+// scatterings is drawn, and with it the direction to begin with. Returns what the way brings by itself, densities included, per band; 0: not worth
+// looking.
+vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_sun)
+{
+	vec3 peak = vec3(extinction) - vec3(extinction_modified);
+	float hero_peak = path_of_hero(peak, path.hero);
+	path.reach = path_sun_reach(height, mu_sun);
+	path.cloudy = path_sun_look(place, height, mu_sun, path.reach);
+	path.arc = 0.0;
+	path.weight = 0.0;
+	float expected = 0.0;
+	for (int i = 0; i < PATH_PARTS; i++)
+		expected += path_part_cloudy(path.cloudy, i) ? (path_part_start(i + 1) - path_part_start(i)) * path.reach : 0.0;
+	float whole = path_sun_whole(path.cloudy);
+
+	float patience = clamp(4.0 * exp(-path_of_hero(vec3(extinction_modified), path.hero) * expected), 0.03, 1.0);
+	bool looks = path_random(path) < patience;
+	// Poisson's law by inversion.
+	float way = whole * path.reach;
+	float mean = hero_peak * way;
+	float term = exp(-mean);
+	float sum = term;
+	float share = path_random(path);
+	int count = 0;
+	for (int i = 1; i <= PATH_CHAIN_LENGTH; i++) {
+		if (share > sum) {
+			count = i;
+			term *= mean / float(i);
+			sum += term;
+		}
+	}
+	path.left = min(count, PATH_CHAIN_LENGTH - 1);
+	uint which = uint(path_random(path) * 4096.0);
+	float around = 2.0 * PI * path_random(path);
+	path.chain = ivec2(int(which & 63u) * PATH_CHAIN_LENGTH, int(which >> 6u) + PATH_CHAIN_ROWS * path.hero);
+	path.turn = vec2(cos(around), sin(around));
+	vec4 texel = path_sun_texel(path);
+	path.direction = path_sun_direction(path, texel);
+	// More forward scatterings than a chain holds are left out: a share of 1e-5 of what gets through so much cloud at all.
+	vec3 lets = exp(vec3(mean) - vec3(extinction) * expected) / patience;
+	vec3 densities = path_sun_ratio(path, texel) * exp((vec3(hero_peak) - peak) * way);
+	path_sun_draw_next(path, whole);
+	// The way's own density stands in path_weight as exp(-peak way), of which `lets` holds the hero's inverse.
+	vec3 own = path_sun_ratio(path, texel);
+	vec3 weight = path.share * path.ratio * own / max(dot(PATH_HERO_SHARE, path.ratio * densities), 1e-30);
+	return looks && count < PATH_CHAIN_LENGTH ? weight * lets : vec3(0.0);
+}
+
+// A free path of the search ends inside the cloud or outside of it. false when nothing is left.
+bool path_sun_collides(INOUT(light_path) path, bool inside, float largest)
+{
+	bool expected = path_part_cloudy(path.cloudy, path_part_at(path.arc / path.reach));
+	vec3 factor = vec3(1.0) - vec3(extinction) * ((inside ? 1.0 : 0.0) - (expected ? 1.0 : 0.0)) / largest;
+	// Where cloud is unexpected hardly anything is left.
+	float most = clamp(max(factor.x, max(factor.y, factor.z)), 0.0, 1.0);
+	path.sun *= factor / max(most, 1e-6);
+	return path_random(path) < most;
+}
+
+// The next forward scattering, in cloud.
+void path_sun_turns(INOUT(light_path) path)
+{
+	path.sun /= path_part_share(path.cloudy, path_part_at(path.arc / path.reach));
+	path.left = max(path.left - 1, 0);
+	path.direction = path_sun_direction(path, path_sun_texel(path));
+	path_sun_draw_next(path, path_sun_whole(path.cloudy));
+	path.mode = PATH_SUN;
+}
+#endif

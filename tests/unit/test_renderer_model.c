@@ -1,0 +1,167 @@
+/* The reference model as scenes ask for it: parts that add up, seeds, ends by time and by cancelling. */
+#include "renderer/gl/timer.h"
+#include "tests/unit/test_renderer_common.h"
+
+enum { WIDTH = 24, HEIGHT = 18, PIXELS = WIDTH * HEIGHT };
+
+static struct scene reference_scene(int samples, uint32_t layers)
+{
+	struct scene scene = small_scene(WIDTH, HEIGHT, layers);
+	scene.model.name = MODEL_REFERENCE;
+	scene.model.samples = samples;
+	scene.clouds.resolution = 128;
+	scene.camera.elevation_deg = 25;
+	return scene;
+}
+
+static double mean_luminance(const struct frame *frame, enum layer layer)
+{
+	double sum = 0;
+	for (int y = 0; y < HEIGHT; y++)
+		for (int x = 0; x < WIDTH; x++)
+			sum += luminance_of(frame, layer, x, y) / PIXELS;
+	return sum;
+}
+
+static void assert_same(const struct frame *a, const struct frame *b)
+{
+	assert_int_equal(a->bytes, b->bytes);
+	assert_memory_equal(a->pixels, b->pixels, a->bytes);
+}
+
+static void parts_add_up(void **state)
+{
+	(void)state;
+	for (int above = 0; above < 2; above++) {
+		struct scene scene = reference_scene(6, (1u << (LAYER_AIR + 1)) - 1);
+		scene.camera.position_m[2] = above ? 3000 : 2;
+		scene.camera.elevation_deg = above ? -20 : 5; /* some ground, some sky */
+		struct frame frame = render(&scene);
+		assert_int_equal(frame.samples, 6);
+		for (int y = 0; y < HEIGHT; y++)
+			for (int x = 0; x < WIDTH; x++)
+				for (int c = 0; c < 3; c++) {
+					double sum = 0;
+					for (int i = LAYER_SUN_DIRECT; i <= LAYER_AIR; i++)
+						sum += pixel_of(&frame, (enum layer)i, x, y)[c];
+					const double color = pixel_of(&frame, LAYER_COLOR, x, y)[c];
+					assert_true(fabs(sum - color) < 1e-3 * fabs(color) + 1e-4);
+				}
+		for (int i = LAYER_ORDER1; i <= LAYER_GROUND; i++)
+			assert_true(mean_luminance(&frame, (enum layer)i) > 0 || (above && i == LAYER_SKY) || i == LAYER_SKY);
+		frame_finish(&frame);
+	}
+}
+
+static void seeds_make_the_picture(void **state)
+{
+	(void)state;
+	struct scene scene = reference_scene(5, LAYER(COLOR));
+	struct frame first = render(&scene), again = render(&scene);
+	scene.model.seed = 7;
+	struct frame other = render(&scene);
+	assert_same(&first, &again);
+	assert_memory_not_equal(first.pixels, other.pixels, first.bytes);
+	frame_finish(&first);
+	frame_finish(&again);
+	frame_finish(&other);
+}
+
+/* The standard error says by how much pictures of other seeds differ, and falls as the root of the samples. */
+static void standard_error_is_the_scatter(void **state)
+{
+	(void)state;
+	double error[2], scatter = 0;
+	for (int i = 0; i < 2; i++) {
+		struct scene scene = reference_scene(i ? 256 : 64, LAYER(COLOR) | LAYER(STANDARD_ERROR));
+		struct frame frame = render(&scene);
+		error[i] = 0;
+		for (int k = 0; k < PIXELS; k++)
+			error[i] += pow(pixel_of(&frame, LAYER_STANDARD_ERROR, k % WIDTH, k / WIDTH)[1], 2) / PIXELS;
+		if (i == 1) {
+			scene.model.seed = 3;
+			struct frame other = render(&scene);
+			for (int k = 0; k < PIXELS; k++)
+				scatter += pow(pixel_of(&frame, LAYER_COLOR, k % WIDTH, k / WIDTH)[1] -
+						       pixel_of(&other, LAYER_COLOR, k % WIDTH, k / WIDTH)[1],
+					       2) /
+					   (2 * PIXELS);
+			frame_finish(&other);
+		}
+		frame_finish(&frame);
+	}
+	print_message("rms standard error %.3f, %.3f; scatter %.3f\n", sqrt(error[0]), sqrt(error[1]), sqrt(scatter));
+	assert_true(sqrt(error[0] / error[1]) > 1.4 && sqrt(error[0] / error[1]) < 2.8);
+	assert_true(sqrt(scatter / error[1]) > 0.7 && sqrt(scatter / error[1]) < 1.3);
+}
+
+/* Asked so many times it says no. */
+static bool is_impatient(void *context)
+{
+	int *patience = context;
+	return --*patience < 0;
+}
+
+static void cancelling_leaves_what_there_is(void **state)
+{
+	(void)state;
+	struct scene scene = reference_scene(4096, LAYER(COLOR));
+	for (int partial = 0; partial < 2; partial++) {
+		struct frame frame;
+		int patience = 60;
+		scene.model.partial = partial;
+		const enum render_result result = renderer_render(renderer, &scene, is_impatient, &patience, &frame);
+		assert_int_equal(result, partial ? RENDER_OK : RENDER_CANCELLED);
+		if (partial) {
+			assert_true(frame.partial && frame.samples > 0 && frame.samples < 4096);
+			assert_true(mean_luminance(&frame, LAYER_COLOR) > 0.1);
+		}
+		frame_finish(&frame);
+	}
+	/* Before there is a picture there is none to answer. */
+	struct frame frame;
+	int patience = 0;
+	assert_int_equal(renderer_render(renderer, &scene, is_impatient, &patience, &frame), RENDER_CANCELLED);
+}
+
+static void time_ends_the_paths(void **state)
+{
+	(void)state;
+	struct scene scene = reference_scene(65536, LAYER(COLOR));
+	scene.model.time_budget_ms = 300;
+	const double begin = clock_milliseconds();
+	struct frame frame = render(&scene);
+	const double took = clock_milliseconds() - begin;
+	print_message("%d samples in %.0f ms\n", frame.samples, took);
+	assert_true(frame.samples > 0 && frame.samples < 65536 && !frame.partial);
+	assert_true(took < 30000);
+	frame_finish(&frame);
+}
+
+static void clear_skies_have_no_error(void **state)
+{
+	(void)state;
+	struct scene scene = reference_scene(4, LAYER(COLOR) | LAYER(STANDARD_ERROR));
+	scene.clouds.type = CLOUD_NONE;
+	struct frame reference = render(&scene);
+	scene.model.name = MODEL_SLAB;
+	scene.output.layers = LAYER(COLOR);
+	struct frame slab = render(&scene);
+	assert_true(mean_luminance(&reference, LAYER_STANDARD_ERROR) == 0);
+	assert_true(fabs(mean_luminance(&reference, LAYER_COLOR) / mean_luminance(&slab, LAYER_COLOR) - 1) < 1e-3);
+	frame_finish(&reference);
+	frame_finish(&slab);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(parts_add_up),
+		cmocka_unit_test(seeds_make_the_picture),
+		cmocka_unit_test(standard_error_is_the_scatter),
+		cmocka_unit_test(cancelling_leaves_what_there_is),
+		cmocka_unit_test(time_ends_the_paths),
+		cmocka_unit_test(clear_skies_have_no_error),
+	};
+	return RUN_WITH_RENDERER(tests);
+}

@@ -179,6 +179,27 @@ float channel_peak(const struct frame &frame, const struct channel &channel)
 	return peak;
 }
 
+/* Does half keep too little of a channel? It has its 11 bits from 2^-14 to 65504. Below, it has the fewer the smaller a value is, which
+ * matters within twelve stops of the channel's peak: what is darker is invisible beside that. One value in a hundred may be lost so. */
+bool is_beyond_half(const struct frame &frame, const struct channel &channel, float peak)
+{
+	constexpr float half_normal = 1.0f / 16384, shadow = 1.0f / 4096;
+	if (peak > half_max)
+		return true;
+	const float least = shadow * peak;
+	if (least >= half_normal)
+		return false;
+	const size_t count = static_cast<size_t>(frame.width) * frame.height;
+	size_t seen = 0, coarse = 0;
+	for (size_t i = 0; i < count; i++) {
+		const float value = std::fabs(channel.first[i * frame.channels]);
+		const bool matters = value > 0 && value >= least;
+		seen += matters;
+		coarse += matters && value < half_normal;
+	}
+	return coarse * 100 > seen;
+}
+
 std::vector<channel> choose_channels(const struct frame &frame, enum exr_type type, bool &clamped)
 {
 	std::vector<channel> channels;
@@ -187,10 +208,10 @@ std::vector<channel> choose_channels(const struct frame &frame, enum exr_type ty
 		int component = 0;
 		for (const std::string &name : channel_names(frame.layer[i])) {
 			channel added = {name, static_cast<const float *>(frame.pixels) + i * plane + component++, type != EXR_FLOAT};
-			const bool too_large = channel_peak(frame, added) > half_max;
-			if (type == EXR_AUTO && too_large)
+			const float peak = channel_peak(frame, added);
+			if (type == EXR_AUTO && is_beyond_half(frame, added, peak))
 				added.is_half = false;
-			clamped = clamped || (type == EXR_HALF && too_large);
+			clamped = clamped || (type == EXR_HALF && peak > half_max);
 			channels.push_back(added);
 		}
 	}

@@ -194,6 +194,27 @@ float channel_peak(picture_size size, const struct channel &channel)
 	return peak;
 }
 
+/* Does half keep too little of a channel? It has its 11 bits from 2^-14 to 65504. Below, it has the fewer the smaller a value is, which
+ * matters within twelve stops of the channel's peak: what is darker is invisible beside that. One value in a hundred may be lost so. */
+bool is_beyond_half(picture_size size, const struct channel &channel, float peak)
+{
+	constexpr float half_normal = 1.0f / 16384, shadow = 1.0f / 4096;
+	if (peak > half_max)
+		return true;
+	const float least = shadow * peak;
+	if (least >= half_normal)
+		return false;
+	const size_t count = static_cast<size_t>(size.width) * size.height;
+	size_t seen = 0, coarse = 0;
+	for (size_t i = 0; i < count; i++) {
+		const float value = std::fabs(channel.first[i * channel.stride]);
+		const bool matters = value > 0 && value >= least;
+		seen += matters;
+		coarse += matters && value < half_normal;
+	}
+	return coarse * 100 > seen;
+}
+
 std::vector<channel> list_channels(const struct frame &frame)
 {
 	std::vector<channel> channels;
@@ -220,9 +241,9 @@ bool choose_types(picture_size size, enum exr_type type, std::vector<channel> &c
 {
 	bool clamped = false;
 	for (channel &channel : channels) {
-		const bool too_large = channel_peak(size, channel) > half_max;
-		channel.is_half = type != EXR_FLOAT && !(type == EXR_AUTO && too_large);
-		clamped = clamped || (type == EXR_HALF && too_large);
+		const float peak = channel_peak(size, channel);
+		channel.is_half = type == EXR_HALF || (type == EXR_AUTO && !is_beyond_half(size, channel, peak));
+		clamped = clamped || (type == EXR_HALF && peak > half_max);
 	}
 	return clamped;
 }

@@ -7,7 +7,7 @@
 int exchange_side(double tile_m, double distance_m)
 {
 	int side = EXCHANGE_SIDE_MIN;
-	while (side < EXCHANGE_SIDE_MAX && side < 3 * tile_m / distance_m)
+	while (side < EXCHANGE_SIDE_MAX && side < EXCHANGE_TEXELS * tile_m / distance_m)
 		side *= 2;
 	return side;
 }

@@ -14,8 +14,11 @@
 
 enum { EXCHANGE_BANDS = 3, EXCHANGE_SIDE_MIN = 16, EXCHANGE_SIDE_MAX = FOURIER_SIDE_MAX };
 
-/* Texels a side: at least three to the distance h, below which received light has no detail, within EXCHANGE_SIDE_MIN.._MAX. A power of
- * two. tile_m, distance_m > 0. */
+/* Texels to the distance h, below which received light has no detail: squares of any size and place, read linearly between the texels'
+ * centres, are then within 2 % of the emitter's value. */
+#define EXCHANGE_TEXELS 3.2
+
+/* Texels a side: a power of two, enough for that up to tiles of 160 h; EXCHANGE_SIDE_MIN.._MAX. tile_m, distance_m > 0. */
 int exchange_side(double tile_m, double distance_m);
 
 /* Form factor of a rectangle in a parallel plane at distance 1 with one corner above the point and sides x and y; odd in both. (J. R.

@@ -2,7 +2,7 @@
 #ifndef STRATUS_RENDERER_STAGES_FOURIER_H
 #define STRATUS_RENDERER_STAGES_FOURIER_H
 
-enum { FOURIER_SIDE_MAX = 256 };
+enum { FOURIER_SIDE_MAX = 512 };
 
 /* Tables for one side. Read-only once filled. */
 struct fourier {

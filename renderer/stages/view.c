@@ -68,6 +68,7 @@ static struct pass *pass_of(struct view_stage *stage, const struct view_variant 
 bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
+	view_samples_init(&stage->samples, compiler);
 	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, 2) && view_up_init(&stage->up, compiler) &&
 		  height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
@@ -93,6 +94,7 @@ void view_stage_finish(struct view_stage *stage)
 	texture_finish(&stage->spare);
 	disc_buffer_finish(&stage->disc);
 	height_view_finish(&stage->height);
+	view_samples_finish(&stage->samples);
 	*stage = (struct view_stage){0};
 }
 
@@ -340,7 +342,7 @@ static bool run_whole(struct view_stage *stage, const struct camera_view *view, 
 
 /* One view of the picture after the other. */
 static bool run_views(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-		      struct view_variant variant, struct pass_run *run)
+		      struct view_variant variant, struct view_samples samples, struct pass_run *run)
 {
 	/* Programs made only for this picture are not worth making three of. */
 	const bool whole = variant.layers || variant.twilight;
@@ -358,9 +360,12 @@ static bool run_views(struct view_stage *stage, struct stage_context *context, c
 	for (int i = 0; i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
 		variant.projection = view.projection;
-		variant.large_sun = stage->disc.views[i].large;
+		variant.large_sun = samples.per_side == 1 && stage->disc.views[i].large;
 		view_fill_camera(&context->block, scene, &view);
 		disc_buffer_bind(&stage->disc, i, &context->block);
+		context->block.camera_position[3] *= (float)samples.footprint;
+		if (samples.per_side > 1)
+			set4(context->block.sun_disc_box, 0, 0, 0, 0);
 		stage_upload_block(context);
 		if (!(whole ? run_whole(stage, &view, variant, run) : run_regions(stage, context, &view, variant, run, fast ? &up : NULL)))
 			return false;
@@ -384,12 +389,41 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 				     .ground = ground};
 }
 
+/* The picture with so many rays a side of a pixel. */
+static struct scene scene_of_rays(const struct scene *scene, int per_side)
+{
+	struct scene fine = *scene;
+	fine.output.width *= per_side;
+	fine.output.height *= per_side;
+	return fine;
+}
+
+/* Averages the rays that were run into pixels. */
+static bool reduce_views(struct view_stage *stage, struct stage_context *context, const struct scene *scene, int per_side,
+			 const enum layer *layers, int count, const struct texture *rays, struct picture *const *pictures)
+{
+	bool ok = true;
+	for (int i = 0; i < camera_view_count(scene); i++) {
+		const struct camera_view view = camera_view_of(scene, i);
+		fill_camera(&context->block, scene, &view);
+		disc_buffer_bind(&stage->disc, i, &context->block);
+		stage_upload_block(context);
+		for (int k = 0; ok && k < count; k++)
+			ok = view_samples_reduce(&stage->samples, &view, per_side, layers[k], scene->model.paths, &rays[k],
+						 &pictures[k]->texture);
+	}
+	return ok;
+}
+
 /* Renders up to VIEW_OUTPUTS layers in one pass and hands them to the cache. alone: the color of all paths, and nothing else, is wanted. */
 static bool run_group(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-		      const enum layer *layers, int count, bool alone, const struct texture **textures)
+		      struct view_samples samples, const enum layer *layers, int count, bool alone, const struct texture **textures)
 {
+	const int per_side = samples.per_side;
 	struct picture *pictures[VIEW_OUTPUTS] = {0};
-	struct texture *targets[VIEW_OUTPUTS] = {0};
+	struct texture *targets[VIEW_OUTPUTS] = {0}, rays[VIEW_OUTPUTS] = {0};
+	const struct scene fine = scene_of_rays(scene, per_side);
+	bool ok = false;
 	struct pass_run run = {.targets = targets};
 	const struct view_variant variant = view_variant_of(context, scene, inputs, !alone);
 	for (int i = 0; i <= LAYER_AIR - LAYER_SUN_DIRECT; i++)
@@ -398,27 +432,31 @@ static bool run_group(struct view_stage *stage, struct stage_context *context, c
 	for (int i = 0; i < count; i++) {
 		run.arguments[0][i] = (float)layers[i];
 		pictures[i] = picture_create(stage, scene);
-		if (!pictures[i])
-			goto fail;
-		targets[i] = &pictures[i]->texture;
+		if (!pictures[i] ||
+		    (per_side > 1 && !texture_init(&rays[i], fine.output.width, fine.output.height, TEXTURE_RGBA32F, TEXTURE_NEAREST)))
+			goto end;
+		targets[i] = per_side > 1 ? &rays[i] : &pictures[i]->texture;
 	}
-	if (!run_views(stage, context, scene, inputs, variant, &run))
-		goto fail;
+	if (!run_views(stage, context, &fine, inputs, variant, samples, &run) ||
+	    (per_side > 1 && !reduce_views(stage, context, scene, per_side, layers, count, rays, pictures)))
+		goto end;
 	for (int i = 0; i < count; i++) {
 		const struct cache_key key = make_key(scene, layers[i], alone);
 		struct picture *picture = pictures[i];
 		pictures[i] = NULL;
 		if (!cache_keep(context->cache, &key, picture, texture_bytes(&picture->texture), picture_destroy))
-			goto fail;
+			goto end;
 		textures[i] = &picture->texture;
 	}
-	return true;
+	ok = true;
 
-fail:
-	for (int i = 0; i < count; i++)
+end:
+	for (int i = 0; i < count; i++) {
 		if (pictures[i])
 			picture_destroy(pictures[i]);
-	return false;
+		texture_finish(&rays[i]);
+	}
+	return ok;
 }
 
 /* What the picture sees of the layer below the camera, one view after the other. */
@@ -458,13 +496,14 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	struct height_view seen = {0};
 	struct view_inputs with_seen = *inputs;
 	with_seen.seen = &seen;
+	const struct view_samples samples = side_of(scene, inputs) == VIEW_BELOW ? view_samples_of(scene) : (struct view_samples){1, 1};
 	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0), inputs->sun_cover) &&
 		  (side_of(scene, inputs) != VIEW_ABOVE || see_layer(stage, context, scene, inputs->field, &seen));
 	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};
 		ok = !(cancelled && cancelled(cancel_context)) &&
-		     run_group(stage, context, scene, &with_seen, missing + i, group, alone, made);
+		     run_group(stage, context, scene, &with_seen, samples, missing + i, group, alone, made);
 		for (int k = 0; k < group; k++)
 			pictures[place[i + k]] = made[k];
 		i += group;

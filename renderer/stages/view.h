@@ -7,6 +7,7 @@
 
 #include "renderer/stages/disc.h"
 #include "renderer/stages/height_view.h"
+#include "renderer/stages/view_samples.h"
 #include "renderer/stages/view_up.h"
 
 /* Layers that one run of the view pass makes. */
@@ -41,6 +42,7 @@ struct view_stage {
 	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][2][VIEW_GROUNDS];
 	struct view_up_stage up;
 	struct height_view_stage height;
+	struct view_samples_stage samples;
 	struct pass *develop[2]; /* into codes of 16 and of 8 bits */
 	struct texture spare;    /* of a picture that was dropped, to be used again; may be none */
 	struct disc_buffer disc; /* of the last picture made */

@@ -1,5 +1,5 @@
 // The cloud base as the exchange of light with the ground sees it, in the frame of the drifting clouds; per texel the mean over the thicknesses beneath it.
-// arguments[0].x: texels of the thickness map a side of a texel.
+// arguments[0].x: texels of the thickness map a side of a texel; less than 1 where those are larger.
 // 0 diffuse light sent down (sun scattered often, the sky through the layer, and what the air below adds), W/m2/nm
 // 1 albedo for diffuse light; 2 transmittance for the beam.
 #include "shaders/lib/slab.glsl"
@@ -9,13 +9,14 @@ uniform sampler2D thickness_table;
 
 void pass(ivec2 pixel)
 {
-	int side = int(arguments[0].x);
+	int side = int(max(arguments[0].x, 1.0));
+	ivec2 first = ivec2(vec2(pixel) * arguments[0].x);
 	vec3 diffuse = vec3(0.0);
 	vec3 albedo = vec3(0.0);
 	vec3 direct = vec3(0.0);
 	for (int y = 0; y < side; y++) {
 		for (int x = 0; x < side; x++) {
-			float thickness = texelFetch(thickness_table, pixel * side + ivec2(x, y), 0).x;
+			float thickness = texelFetch(thickness_table, first + ivec2(x, y), 0).x;
 			diffuse += slab_multiple(thickness, true);
 			albedo += slab_spherical_albedo(thickness);
 			direct += slab_directional_transmittance(thickness);

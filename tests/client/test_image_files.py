@@ -111,6 +111,17 @@ def test_exr_types(samples):
     assert set(automatic.values()) == {"half"}
 
 
+def test_dark_channels_are_float(samples):
+    spec, values = read(samples / "dark.exr", "float")
+    types = channel_types(spec)
+    assert {types[name] for name in "RGB"} == {"float"}
+    assert {types[name] for name in ("sky.R", "sky.G", "sky.B", "air.R", "air.G", "air.B")} == {"half"}
+    place = numpy.arange(3 * WIDTH * HEIGHT).reshape(HEIGHT, WIDTH, 3)
+    wanted = 1e-5 * (1 + 0.001 * (place % 7919))
+    found = values[:, :, [spec.channelnames.index(name) for name in "RGB"]]
+    assert abs(found / wanted - 1).max() < 1e-6
+
+
 def test_exr_clamping_is_said(samples):
     assert read(samples / "half-zip.exr", "float")[0].getattribute("stratus:clamped_to") == 65504
     assert read(samples / "auto-zip.exr", "float")[0].getattribute("stratus:clamped_to") is None

@@ -120,6 +120,20 @@ def test_exr_types(daemon, read_image):
         assert str(spec.format) == kind
 
 
+def test_exr_type_follows_the_light(daemon, read_image):
+    """Daylight as half; deep twilight, which half would darken to nothing, as float."""
+    for elevation, kind in ((30, "half"), (-11, "float")):
+        scene = {
+            "sun": {"elevation_deg": elevation, "azimuth_deg": 180},
+            "camera": {"azimuth_deg": 60},
+            "clouds": {"type": "none"},
+            "output": {"width": 64, "height": 48, "format": "exr"},
+        }
+        pixels, spec = read_image(daemon.render(scene).body)
+        assert str(spec.format) == kind
+        assert (pixels[:20] > 0).all()
+
+
 @pytest.mark.parametrize("compression", ["none", "rle", "zip", "piz", "dwaa"])
 def test_exr_compressions(daemon, read_image, compression):
     scene = {"output": {"width": 64, "height": 48, "format": "exr", "exr_compression": compression}}

@@ -151,6 +151,25 @@ static void test_exr_repeats(void **state)
 		}
 }
 
+/* Light of deep twilight: all of it below what half has 11 bits for; with a bright spot beside which that is nothing; and bright, but for
+ * one value in a hundred and fifty. */
+static void test_exr_dark(void **state)
+{
+	(void)state;
+	static const enum layer layers[] = {LAYER_COLOR, LAYER_SKY, LAYER_AIR};
+	struct frame frame = sample_frame(PIXEL_F32, 3, layers);
+	const struct scene scene = sample_scene(IMAGE_EXR);
+	const size_t plane = (size_t)WIDTH * HEIGHT * 3;
+	float *values = frame.pixels;
+	for (size_t i = 0; i < 3 * plane; i++)
+		values[i] = 1e-5f * (1 + 0.001f * (float)(i % 7919));
+	values[plane] = values[plane + 1] = values[plane + 2] = 1;
+	for (size_t i = 2 * plane; i < 3 * plane; i++)
+		values[i] = (i - 2 * plane) / 3 % 150 == 0 ? 3e-5f : 0.01f;
+	encode_and_repeat("dark.exr", &frame, &scene);
+	free(frame.pixels);
+}
+
 static void test_exr_panoramas(void **state)
 {
 	(void)state;
@@ -272,8 +291,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_module_loads_once), cmocka_unit_test(test_png_repeats),   cmocka_unit_test(test_exr_repeats),
-		cmocka_unit_test(test_exr_panoramas),     cmocka_unit_test(test_png_refusals),  cmocka_unit_test(test_exr_refusals),
-		cmocka_unit_test(test_size_refusals),     cmocka_unit_test(test_threads_agree),
+		cmocka_unit_test(test_exr_dark),          cmocka_unit_test(test_exr_panoramas), cmocka_unit_test(test_png_refusals),
+		cmocka_unit_test(test_exr_refusals),      cmocka_unit_test(test_size_refusals), cmocka_unit_test(test_threads_agree),
 	};
 	return cmocka_run_group_tests(tests, load, NULL);
 }

@@ -1,4 +1,5 @@
 /* Light between ground and clouds: its form factors, and whole pictures of a uniform deck. */
+#include "renderer/stages/exchange.h"
 #include "tests/validate/deck.h"
 #include "tests/validate/squares.h"
 #include "tests/validate/validate.h"
@@ -17,7 +18,7 @@ static void compare_squares(struct validation *validation)
 			double texel;
 			const double tile = tiles_m[i / 5], base = bases_m[i % 5], error = square_error(tile, base, halves[k], &texel);
 			require(error >= 0, "out of memory");
-			if (texel <= 1 / 3.0)
+			if (texel <= 1 / EXCHANGE_TEXELS)
 				tally_add(&validation->measured.tally[TALLY_SQUARES], error, "tile %.0f m, base %.0f m, a = %g h", tile,
 					  base, halves[k]);
 			else
@@ -27,7 +28,7 @@ static void compare_squares(struct validation *validation)
 		"- Squares: half-widths of h/2 to 16 h, seen in front of centre, edge and corner and outside, tiles of 2 to 200 km, bases "
 		"at "
 		"100 to 12000 m,\n"
-		"  where the planes' texels are a third of h or finer: tiles up to 85 times the base's height. Beyond, squares of whole "
+		"  where the planes have 3.2 texels to h or more: tiles up to 160 times the base's height. Beyond, squares of whole "
 		"texels are exact in\n"
 		"  front of texels' centres, and linear in between, here by up to %.0f %% off.\n",
 		100 * largest);

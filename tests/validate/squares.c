@@ -57,7 +57,7 @@ double square_error(double tile_m, double distance_m, double half_width, double 
 	struct exchange exchange = {0};
 	double worst = -1;
 	*texel = tile_m / side / distance_m;
-	const bool fine = *texel <= 1 / 3.0;
+	const bool fine = *texel <= 1 / EXCHANGE_TEXELS;
 	const double a = fine ? fmin(half_width / *texel, 0.4 * side) : fmax(1, round(half_width / *texel));
 	const double x = side / 2 + (fine ? 0.37 : 0), y = side / 2 - (fine ? 0.21 : 0);
 	if (kernel && values && exchange_init(&exchange, side, kernel, (const double[]){0, 0})) {

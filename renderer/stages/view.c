@@ -405,7 +405,7 @@ static bool reduce_views(struct view_stage *stage, struct stage_context *context
 	bool ok = true;
 	for (int i = 0; i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
-		fill_camera(&context->block, scene, &view);
+		view_fill_camera(&context->block, scene, &view);
 		disc_buffer_bind(&stage->disc, i, &context->block);
 		stage_upload_block(context);
 		for (int k = 0; ok && k < count; k++)

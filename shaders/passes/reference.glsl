@@ -1,6 +1,6 @@
-// The reference model: samples of a pixel, light paths from the camera until all light is found. Adds to the sums of the picture: 0 color, linear Rec.709; 1 its square; then, where
-// REFERENCE_LAYERS, six layers (enum layer) in the bands. arguments[0]: first sample, samples, seed (lower and upper 16 bits); [1] and [2].xy: layers; [2].z: kinds of light that are
-// shown, as a bit set.
+// The reference model: samples of a pixel, light paths from the camera until all light is found. Adds to the sums of the picture: 0 color, linear Rec.709; 1 the part of it that is left to
+// chance, without the sun's disc, and 2 that one's square; then, where REFERENCE_LAYERS, five layers (enum layer) in the bands. arguments[0]: first sample, samples, seed (lower and upper 16
+// bits); [1] and [2].x: layers; [2].y: kinds of light that are shown, as a bit set.
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/colour.glsl"
 #include "shaders/lib/ground.glsl"
@@ -35,6 +35,8 @@ const int REFERENCE_STEPS = 2;
 
 struct reference_sums {
 	vec3 light; // of this sample, in the bands
+	vec3 certain; // part of it that is the same for all samples
+	vec3 chance;
 	vec3 color;
 	vec3 squares;
 #if REFERENCE_LAYERS
@@ -43,7 +45,6 @@ struct reference_sums {
 	vec3 layer_2;
 	vec3 layer_3;
 	vec3 layer_4;
-	vec3 layer_5;
 #endif
 };
 
@@ -56,13 +57,12 @@ void reference_keep(INOUT(reference_sums) sums, int kind, vec3 value)
 	sums.layer_2 += arguments[1].z == number ? value : vec3(0.0);
 	sums.layer_3 += arguments[1].w == number ? value : vec3(0.0);
 	sums.layer_4 += arguments[2].x == number ? value : vec3(0.0);
-	sums.layer_5 += arguments[2].y == number ? value : vec3(0.0);
 #endif
 }
 
 void reference_add(INOUT(reference_sums) sums, int kind, vec3 light)
 {
-	bool shown = (int(arguments[2].z) >> (kind - 1) & 1) != 0;
+	bool shown = (int(arguments[2].y) >> (kind - 1) & 1) != 0;
 	sums.light += shown ? light : vec3(0.0);
 	reference_keep(sums, kind, light);
 }
@@ -101,8 +101,15 @@ void reference_first(INOUT(light_path) path, INOUT(reference_sums) sums, int wha
 		if (what == 2)
 			reference_add(sums, KIND_SKY, max(total - near, vec3(0.0)) * passes);
 	}
-	if (what != 1)
-		reference_add(sums, KIND_SUN_DIRECT, disc * (VIEW_LARGE_SUN > 0 ? (what == 2 ? passes : vec3(0.0)) : vec3(1.0)));
+	if (what != 1) {
+#if VIEW_LARGE_SUN
+		reference_add(sums, KIND_SUN_DIRECT, what == 2 ? disc * passes : vec3(0.0));
+#else
+		vec3 before = sums.light;
+		reference_add(sums, KIND_SUN_DIRECT, disc);
+		sums.certain = sums.light - before;
+#endif
+	}
 #endif
 	path.share = what == 1 ? to_end : to_layer;
 	vec3 way = path.place - vec3(0.0, 0.0, camera_position.z);
@@ -132,6 +139,7 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.reach = 1.0;
 	path.cloudy = 0;
 	sums.light = vec3(0.0);
+	sums.certain = vec3(0.0);
 	float h = camera_position.z;
 	float mu = path.direction.z;
 #if REFERENCE_ABOVE
@@ -327,6 +335,7 @@ void pass(ivec2 pixel)
 {
 	reference_sums sums;
 	sums.color = vec3(0.0);
+	sums.chance = vec3(0.0);
 	sums.squares = vec3(0.0);
 #if REFERENCE_LAYERS
 	sums.layer_0 = vec3(0.0);
@@ -334,7 +343,6 @@ void pass(ivec2 pixel)
 	sums.layer_2 = vec3(0.0);
 	sums.layer_3 = vec3(0.0);
 	sums.layer_4 = vec3(0.0);
-	sums.layer_5 = vec3(0.0);
 #endif
 	vec3 disc = vec3(sun_at_camera) * sun_disc_share(pixel);
 	uint number = uint(arguments[0].x);
@@ -363,19 +371,21 @@ void pass(ivec2 pixel)
 		if (path.mode == PATH_DONE) {
 			vec3 rgb = colour_of_bands(sums.light);
 			sums.color += rgb;
+			rgb = colour_of_bands(sums.light - sums.certain);
+			sums.chance += rgb;
 			sums.squares += rgb * rgb;
 			path.mode = PATH_START;
 			number += 1u;
 		}
 	}
 	STORE(0, vec4(sums.color, arguments[0].y));
-	STORE(1, vec4(sums.squares, 0.0));
+	STORE(1, vec4(sums.chance, 0.0));
+	STORE(2, vec4(sums.squares, 0.0));
 #if REFERENCE_LAYERS
-	STORE(2, vec4(sums.layer_0, 0.0));
-	STORE(3, vec4(sums.layer_1, 0.0));
-	STORE(4, vec4(sums.layer_2, 0.0));
-	STORE(5, vec4(sums.layer_3, 0.0));
-	STORE(6, vec4(sums.layer_4, 0.0));
-	STORE(7, vec4(sums.layer_5, 0.0));
+	STORE(3, vec4(sums.layer_0, 0.0));
+	STORE(4, vec4(sums.layer_1, 0.0));
+	STORE(5, vec4(sums.layer_2, 0.0));
+	STORE(6, vec4(sums.layer_3, 0.0));
+	STORE(7, vec4(sums.layer_4, 0.0));
 #endif
 }

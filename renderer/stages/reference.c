@@ -14,7 +14,8 @@ enum {
 	HEIGHT_SIDE = 1024, /* of the field's height, as in shaders/lib/height.glsl */
 	TOPS_SIDE_MIN = 1024,
 	TOPS_SIDE_MAX = 4096,
-	GROUP = 6, /* layers that one run adds to, beside color and its square */
+	FIXED = 3, /* sums that every picture has: color, its part left to chance, and the square of that */
+	GROUP = PASS_OUTPUTS_MAX - FIXED, /* layers that one run adds to beside them */
 	GROUPS = (LAYER_COUNT + GROUP - 1) / GROUP,
 	SAMPLES_A_PASS = 16
 };
@@ -27,7 +28,7 @@ static const double call_ms = 40;
 /* All that one picture needs. Between two calls: what it was made of is the same then, looked up again. */
 struct reference_work {
 	struct reference_tables tables;
-	struct texture sum, squares, slots[GROUPS][GROUP];
+	struct texture fixed[FIXED], slots[GROUPS][GROUP];
 	enum layer slot_layer[GROUPS][GROUP];
 	int slot_count, group_count;
 	struct path_chains *drawn;
@@ -78,8 +79,8 @@ void reference_work_destroy(struct reference_work *work)
 	if (!work)
 		return;
 	finish_tables(&work->tables);
-	texture_finish(&work->sum);
-	texture_finish(&work->squares);
+	for (int i = 0; i < FIXED; i++)
+		texture_finish(&work->fixed[i]);
 	for (int i = 0; i < GROUPS * GROUP; i++)
 		texture_finish(&work->slots[i / GROUP][i % GROUP]);
 	free(work->drawn);
@@ -99,13 +100,13 @@ static const struct pass *paths_pass(struct reference_stage *stage, const struct
 	const bool layers = work->slot_count > 0;
 	struct pass **pass = &stage->paths[work->side][layers][projection][large][work->ground];
 	char defines[200];
-	const struct pass_desc desc = {.file = "shaders/passes/reference.glsl",
-				       .defines = defines,
-				       .outputs = layers ? 2 + GROUP : 2,
-				       .samplers = {"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end",
-						    "ground_map", "phase_table", "path_tops", "path_bounds", "phase_inverse",
-						    "forward_chains", "sky_at_layer", "sky_at_ground"},
-				       .adds = true};
+	const struct pass_desc desc = {
+		.file = "shaders/passes/reference.glsl",
+		.defines = defines,
+		.outputs = layers ? FIXED + GROUP : FIXED,
+		.samplers = {"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "phase_table",
+			     "path_tops", "path_bounds", "phase_inverse", "forward_chains", "sky_at_layer", "sky_at_ground"},
+		.adds = true};
 	snprintf(defines, sizeof defines,
 		 "#define REFERENCE_ABOVE %d\n#define REFERENCE_LAYERS %d\n#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n"
 		 "#define VIEW_GROUND %d\n",
@@ -130,7 +131,7 @@ static const struct pass *tops_pass(struct reference_stage *stage, enum view_sid
 static const struct pass *resolve_pass(struct reference_stage *stage)
 {
 	const struct pass_desc desc = {
-		.file = "shaders/passes/reference_resolve.glsl", .outputs = 1, .samplers = {"sums", "squares", "colors"}};
+		.file = "shaders/passes/reference_resolve.glsl", .outputs = 1, .samplers = {"sums", "chances", "squares", "colors"}};
 	if (!stage->resolve)
 		stage->resolve = pass_create(&stage->compiler, &desc);
 	return stage->resolve;
@@ -217,7 +218,9 @@ static bool sums_init(struct texture *sums, const struct scene *scene)
 
 static bool make_sums(const struct scene *scene, const enum layer *layers, int count, struct reference_work *work)
 {
-	bool ok = sums_init(&work->sum, scene) && sums_init(&work->squares, scene);
+	bool ok = true;
+	for (int i = 0; ok && i < FIXED; i++)
+		ok = sums_init(&work->fixed[i], scene);
 	for (int i = 0; ok && i < count; i++) {
 		if (layers[i] == LAYER_COLOR || layers[i] == LAYER_STANDARD_ERROR)
 			continue;
@@ -262,7 +265,7 @@ static struct pass_run run_of(const struct scene *scene, const struct reference_
 				 .arguments = {{(float)round->first, (float)round->samples, (float)(scene->model.seed & 0xffff),
 						(float)(scene->model.seed >> 16)},
 					       {0},
-					       {0, 0, (float)scene->model.paths}}};
+					       {0, (float)scene->model.paths}}};
 }
 
 /* Some rows, of all groups. false when a program does not compile. */
@@ -271,10 +274,12 @@ static bool run_rows(struct reference_stage *stage, const struct camera_view *vi
 {
 	for (int group = 0; group < work->group_count; group++) {
 		const struct pass *pass = paths_pass(stage, work, view->projection, large);
-		struct texture *targets[2 + GROUP] = {group == 0 ? &work->sum : NULL, group == 0 ? &work->squares : NULL};
+		struct texture *targets[FIXED + GROUP] = {NULL};
+		for (int i = 0; i < FIXED; i++)
+			targets[i] = group == 0 ? &work->fixed[i] : NULL;
 		for (int i = 0; i < GROUP; i++) {
 			const bool used = group * GROUP + i < work->slot_count;
-			targets[2 + i] = used ? &work->slots[group][i] : NULL;
+			targets[FIXED + i] = used ? &work->slots[group][i] : NULL;
 			run->arguments[1 + i / 4][i % 4] = used ? (float)work->slot_layer[group][i] : -1.0f;
 		}
 		if (!pass)
@@ -369,7 +374,7 @@ static const struct texture *sums_of(const struct reference_work *work, enum lay
 	for (int i = 0; i < work->slot_count; i++)
 		if (work->slot_layer[i / GROUP][i % GROUP] == layer)
 			return &work->slots[i / GROUP][i % GROUP];
-	return &work->sum;
+	return &work->fixed[0];
 }
 
 static bool resolve(struct reference_stage *stage, const struct scene *scene, const enum layer *layers, int count,
@@ -381,7 +386,7 @@ static bool resolve(struct reference_stage *stage, const struct scene *scene, co
 		if (!texture_init(target, scene->output.width, scene->output.height, TEXTURE_RGBA32F, TEXTURE_NEAREST))
 			return false;
 		pass_run(pass, &(struct pass_run){.targets = &target,
-						  .samplers = {sums_of(work, layers[i]), &work->squares, &work->sum},
+						  .samplers = {sums_of(work, layers[i]), &work->fixed[1], &work->fixed[2], &work->fixed[0]},
 						  .arguments = {{(float)layers[i]}}});
 		pictures[i] = target;
 	}

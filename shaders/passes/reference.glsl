@@ -1,10 +1,13 @@
-// The reference model: samples of a pixel, light paths from the camera until all light is found. Adds to the sums of the picture: 0 color, linear Rec.709; 1 its square; then, where
-// REFERENCE_LAYERS, six layers (enum layer) in the bands. arguments[0]: first sample, samples, seed (lower and upper 16 bits); [1] and [2].xy: layers; [2].z: kinds of light that are
-// shown, as a bit set.
+// The reference model: samples of a pixel, light paths from the camera until all light is found. Adds to the sums of the picture: 0 color, linear Rec.709; 1 the part of it that is left to
+// chance, without the sun's disc, and 2 that one's square; then, where REFERENCE_LAYERS, five layers (enum layer) in the bands. arguments[0]: first sample, samples, seed (lower and upper 16
+// bits); [1] and [2].x: layers; [2].y: kinds of light that are shown, as a bit set.
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/colour.glsl"
 #include "shaders/lib/ground.glsl"
 #include "shaders/lib/ground_near.glsl"
+#if VIEW_GROUND == 2
+#include "shaders/lib/sea.glsl"
+#endif
 #include "shaders/lib/light_path_sun.glsl"
 #include "shaders/lib/sun_disc.glsl"
 
@@ -35,6 +38,8 @@ const int REFERENCE_STEPS = 2;
 
 struct reference_sums {
 	vec3 light; // of this sample, in the bands
+	vec3 certain; // part of it that is the same for all samples
+	vec3 chance;
 	vec3 color;
 	vec3 squares;
 #if REFERENCE_LAYERS
@@ -43,7 +48,6 @@ struct reference_sums {
 	vec3 layer_2;
 	vec3 layer_3;
 	vec3 layer_4;
-	vec3 layer_5;
 #endif
 };
 
@@ -56,13 +60,12 @@ void reference_keep(INOUT(reference_sums) sums, int kind, vec3 value)
 	sums.layer_2 += arguments[1].z == number ? value : vec3(0.0);
 	sums.layer_3 += arguments[1].w == number ? value : vec3(0.0);
 	sums.layer_4 += arguments[2].x == number ? value : vec3(0.0);
-	sums.layer_5 += arguments[2].y == number ? value : vec3(0.0);
 #endif
 }
 
 void reference_add(INOUT(reference_sums) sums, int kind, vec3 light)
 {
-	bool shown = (int(arguments[2].z) >> (kind - 1) & 1) != 0;
+	bool shown = (int(arguments[2].y) >> (kind - 1) & 1) != 0;
 	sums.light += shown ? light : vec3(0.0);
 	reference_keep(sums, kind, light);
 }
@@ -101,8 +104,15 @@ void reference_first(INOUT(light_path) path, INOUT(reference_sums) sums, int wha
 		if (what == 2)
 			reference_add(sums, KIND_SKY, max(total - near, vec3(0.0)) * passes);
 	}
-	if (what != 1)
-		reference_add(sums, KIND_SUN_DIRECT, disc * (VIEW_LARGE_SUN > 0 ? (what == 2 ? passes : vec3(0.0)) : vec3(1.0)));
+	if (what != 1) {
+#if VIEW_LARGE_SUN
+		reference_add(sums, KIND_SUN_DIRECT, what == 2 ? disc * passes : vec3(0.0));
+#else
+		vec3 before = sums.light;
+		reference_add(sums, KIND_SUN_DIRECT, disc);
+		sums.certain = sums.light - before;
+#endif
+	}
 #endif
 	path.share = what == 1 ? to_end : to_layer;
 	vec3 way = path.place - vec3(0.0, 0.0, camera_position.z);
@@ -132,6 +142,7 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.reach = 1.0;
 	path.cloudy = 0;
 	sums.light = vec3(0.0);
+	sums.certain = vec3(0.0);
 	float h = camera_position.z;
 	float mu = path.direction.z;
 #if REFERENCE_ABOVE
@@ -194,6 +205,65 @@ void reference_meet_cloud(INOUT(light_path) path, INOUT(reference_sums) sums)
 	reference_first(path, sums, 0, vec3(0.0));
 }
 
+#if VIEW_GROUND == 2
+// The sea that the camera sees: a path is mirrored by one of its slopes, or goes on as light from below the surface; later ones meet it as ground of the sea's albedo. Slopes, what of
+// them the viewer sees, foam and light from below are those of shaders/lib/sea.glsl.
+struct reference_sea {
+	sea_slopes slopes;
+	vec3 to_viewer; // in the frame of the place
+	float area;     // of slopes that the viewer sees, over the horizontal one
+	vec3 leaving;   // radiance out of the water and by foam, over the irradiance
+};
+
+reference_sea reference_sea_at(ground_point point)
+{
+	reference_sea sea;
+	vec2 heading = -point.offset * inversesqrt(max(dot(point.offset, point.offset), 1e-8));
+	float sine = sqrt(max(1.0 - point.mu_v * point.mu_v, 1e-6));
+	sea.slopes = sea_slopes_at(point.offset, heading, point.across, point.across / point.mu_v);
+	sea.to_viewer = vec3(heading * sine, point.mu_v);
+	float deviation = sqrt(sea_variance(sea.slopes.covariance, heading));
+	float rise = min((point.mu_v / sine + dot(sea.slopes.resolved, heading)) / deviation, 1e6);
+	sea.area = max(sine * deviation * normal_ramp(rise), 1e-4);
+	sea.leaving = ground_patch.y * (SEA_LEAVING + vec3(SEA_FOAM * sea_state.w / PI));
+	return sea;
+}
+
+// Of a beam of irradiance 1 normal to it.
+vec3 reference_sea_beam(reference_sea sea, vec3 up, vec3 to_light)
+{
+	float mu = dot(up, to_light);
+	vec3 here = normalize(vec3(to_light.x, to_light.y, 0.0) + vec3(0.0, 0.0, mu));
+	return mu > 1e-3 ? vec3(ground_patch.y * sea_glint(sea.slopes, sea.to_viewer, here, sea.area)) + sea.leaving * mu : vec3(0.0);
+}
+
+// A direction to go on in; the path's share changes by what comes from there.
+vec3 reference_sea_onward(reference_sea sea, vec3 up, INOUT(light_path) path)
+{
+	float radius = sqrt(-2.0 * log(path_random(path)));
+	float around = 2.0 * PI * path_random(path);
+	vec2 normal_pair = radius * vec2(cos(around), sin(around));
+	vec3 c = sea.slopes.covariance;
+	float a = sqrt(max(c.x, 1e-8));
+	float b = c.y / a;
+	vec2 slope = sea.slopes.resolved + vec2(a * normal_pair.x, b * normal_pair.x + sqrt(max(c.z - b * b, 0.0)) * normal_pair.y);
+	vec3 facet = vec3(slope, 1.0);
+	float seen = max(dot(facet, sea.to_viewer), 0.0);
+	vec3 normal = normalize(facet);
+	float cosine = max(dot(normal, sea.to_viewer), 0.0);
+	float mirrored = ground_patch.y * sea_fresnel(cosine) * seen / sea.area;
+	vec3 direction = 2.0 * cosine * normal - sea.to_viewer;
+	direction = normalize(vec3(direction.x, direction.y, max(abs(direction.z), 0.01)));
+	float share = path_random(path);
+	float even = path_random(path);
+	float which = path_random(path);
+	float chance = clamp(mirrored / (mirrored + 3.0 * sea.leaving.y), 0.1, 0.95);
+	path.share *= which < chance ? vec3(mirrored / chance) : sea.leaving * (PI / (1.0 - chance));
+	vec3 lifted = vec3(direction.x, direction.y, 0.0) + up * direction.z;
+	return which < chance ? normalize(lifted) : path_turned(up, sqrt(share), sqrt(1.0 - share), 2.0 * PI * even);
+}
+#endif
+
 // On the ground, t m ahead.
 void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float t)
 {
@@ -205,16 +275,16 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	path.grounded = path.first ? 2 : max(path.grounded, 1);
 	vec2 detail = vec2(1.0);
 	vec2 there = vec2(path.place) + vec2(camera_position);
-#if VIEW_GROUND == 2
-	vec3 reflectance = ground_reflectance(there, footprint);
-#else
-	// What the camera itself sees has all that the slab's view shows of it.
 	ground_point point;
 	point.offset = vec2(path.place);
 	point.across = camera_position.w * t;
 	point.mu_v = mu_v;
 	point.mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
-	if (path.grounded == 2 && path.first)
+#if VIEW_GROUND == 2
+	vec3 reflectance = ground_reflectance(there, footprint);
+#else
+	// What the camera itself sees has all that the slab's view shows of it.
+	if (path.first)
 		detail = ground_detail(point);
 #if VIEW_GROUND == 3
 	vec3 reflectance = ground_ice(ground_reflectance(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
@@ -223,6 +293,9 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 #endif
 #endif
 	reference_first(path, sums, 1, vec3(0.0));
+#if VIEW_GROUND == 2
+	vec3 before = path.share;
+#endif
 	path.share *= reflectance * detail.y;
 	path.straight = false;
 	path.lifted = true;
@@ -232,11 +305,23 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	vec3 entry = path.place + vec3(sun_direction) * sphere_distance_up(0.0, max(mu_sun, 0.0), base);
 	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01)) * sun_irradiance(0.0, mu_sun);
 	float mu_out = dot(up, path.direction);
-	path.sun *= detail.x * max(mu_out, 0.0) / PI;
+	vec3 seen_in = vec3(detail.x * max(mu_out, 0.0) / PI);
+#if VIEW_GROUND == 2
+	reference_sea sea = reference_sea_at(point);
+	if (!again)
+		seen_in = reference_sea_beam(sea, up, path.direction) / max(reflectance, vec3(1e-9));
+#endif
+	path.sun *= seen_in;
 	// Half of all light starts above 45 degrees: Lambert's law.
 	float share = path_random(path);
 	float around = path_random(path);
 	vec3 onward = path_turned(up, sqrt(share), sqrt(1.0 - share), 2.0 * PI * around);
+#if VIEW_GROUND == 2
+	if (!again) {
+		path.share = before;
+		onward = reference_sea_onward(sea, up, path);
+	}
+#endif
 	path.kept_place = path.place + onward * sphere_distance_up(0.0, max(dot(up, onward), 1e-4), base);
 	path.kept_direction = onward;
 	// Light from the ground to clouds is a small part of what a path shows; on the ground that the camera sees it is most.
@@ -327,6 +412,7 @@ void pass(ivec2 pixel)
 {
 	reference_sums sums;
 	sums.color = vec3(0.0);
+	sums.chance = vec3(0.0);
 	sums.squares = vec3(0.0);
 #if REFERENCE_LAYERS
 	sums.layer_0 = vec3(0.0);
@@ -334,7 +420,6 @@ void pass(ivec2 pixel)
 	sums.layer_2 = vec3(0.0);
 	sums.layer_3 = vec3(0.0);
 	sums.layer_4 = vec3(0.0);
-	sums.layer_5 = vec3(0.0);
 #endif
 	vec3 disc = vec3(sun_at_camera) * sun_disc_share(pixel);
 	uint number = uint(arguments[0].x);
@@ -363,19 +448,21 @@ void pass(ivec2 pixel)
 		if (path.mode == PATH_DONE) {
 			vec3 rgb = colour_of_bands(sums.light);
 			sums.color += rgb;
+			rgb = colour_of_bands(sums.light - sums.certain);
+			sums.chance += rgb;
 			sums.squares += rgb * rgb;
 			path.mode = PATH_START;
 			number += 1u;
 		}
 	}
 	STORE(0, vec4(sums.color, arguments[0].y));
-	STORE(1, vec4(sums.squares, 0.0));
+	STORE(1, vec4(sums.chance, 0.0));
+	STORE(2, vec4(sums.squares, 0.0));
 #if REFERENCE_LAYERS
-	STORE(2, vec4(sums.layer_0, 0.0));
-	STORE(3, vec4(sums.layer_1, 0.0));
-	STORE(4, vec4(sums.layer_2, 0.0));
-	STORE(5, vec4(sums.layer_3, 0.0));
-	STORE(6, vec4(sums.layer_4, 0.0));
-	STORE(7, vec4(sums.layer_5, 0.0));
+	STORE(3, vec4(sums.layer_0, 0.0));
+	STORE(4, vec4(sums.layer_1, 0.0));
+	STORE(5, vec4(sums.layer_2, 0.0));
+	STORE(6, vec4(sums.layer_3, 0.0));
+	STORE(7, vec4(sums.layer_4, 0.0));
 #endif
 }

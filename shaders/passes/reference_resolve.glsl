@@ -2,6 +2,7 @@
 #include "shaders/lib/colour.glsl"
 
 uniform sampler2D sums;
+uniform sampler2D chances;
 uniform sampler2D squares;
 uniform sampler2D colors;
 
@@ -16,6 +17,7 @@ void pass(ivec2 pixel)
 		value = mean;
 	} else if (layer == 14) {
 		// Of the mean, from the scatter of the samples; one alone says nothing, so it is taken for as wrong as it may be.
+		mean = vec3(texelFetch(chances, pixel, 0)) / count;
 		vec3 variance = max(vec3(texelFetch(squares, pixel, 0)) / count - mean * mean, vec3(0.0));
 		value = count > 1.5 ? sqrt(variance / (count - 1.0)) : abs(mean);
 	} else if (layer == 11 || layer == 12) {

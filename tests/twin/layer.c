@@ -91,7 +91,7 @@ void layer_init(struct uniform_layer *layer, const struct layer_case *is)
 	fill_textures(layer);
 	fill_block(layer);
 	layer->twin.paths = SCENE_PATHS_ALL;
-	for (int i = 0; i < 6; i++)
+	for (int i = 0; i < TWIN_LAYERS; i++)
 		layer->twin.layer[i] = -1;
 }
 
@@ -127,7 +127,7 @@ static void look(struct uniform_layer *layer, bool above, double mu_v, double az
 struct layer_seen layer_see(struct uniform_layer *layer, bool above, double mu_v, double azimuth, int samples, int threads)
 {
 	static float color[SIDE * SIDE * 4], squares[SIDE * SIDE * 4];
-	float *outputs[TWIN_OUTPUTS] = {color, squares};
+	float *outputs[TWIN_OUTPUTS] = {color, NULL, squares};
 	struct layer_seen seen;
 	memset(color, 0, sizeof color);
 	memset(squares, 0, sizeof squares);

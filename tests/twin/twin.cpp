@@ -115,7 +115,7 @@ extern "C" void twin_run(const struct twin *twin, int width, int height, int fir
 	const int *layer = twin->layer;
 	glsl::arguments[0] = glsl::vec4(first, count, twin->seed & 0xffffu, twin->seed >> 16);
 	glsl::arguments[1] = glsl::vec4(layer[0], layer[1], layer[2], layer[3]);
-	glsl::arguments[2] = glsl::vec4(layer[4], layer[5], twin->paths, 0);
+	glsl::arguments[2] = glsl::vec4(layer[4], twin->paths, 0, 0);
 	std::atomic<int> next{0};
 	const auto work = [&] {
 		for (int row; (row = next++) < height;)

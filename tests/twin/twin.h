@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { TWIN_LEVELS_MAX = 14, TWIN_OUTPUTS = 8 };
+enum { TWIN_LEVELS_MAX = 14, TWIN_LAYERS = 5, TWIN_OUTPUTS = 3 + TWIN_LAYERS };
 
 /* A texture's levels as rows of width x 4 floats, held by the caller. */
 struct twin_texture {
@@ -41,11 +41,12 @@ struct twin {
 	struct twin_texture texture[TWIN_SAMPLER_COUNT];
 	bool above;
 	uint32_t seed, paths;
-	int layer[6]; /* enum layer; -1: none */
+	int layer[TWIN_LAYERS]; /* enum layer; -1: none */
 	const float *disc_weights; /* three bands a pixel of the block's sun_disc_box; NULL: none is seen */
 };
 
-/* Adds samples [first, first + count) of every pixel to the outputs, each width x height x 4 floats: color and its square, then the layers. */
+/* Adds samples [first, first + count) of every pixel to the outputs, each width x height x 4 floats: color, its part left to chance and the
+ * square of that, then the layers. */
 void twin_run(const struct twin *twin, int width, int height, int first, int count, int threads, float *outputs[TWIN_OUTPUTS]);
 
 #endif

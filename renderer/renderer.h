@@ -86,8 +86,8 @@ typedef bool renderer_cancelled(void *context);
 enum render_result { RENDER_OK, RENDER_CANCELLED, RENDER_OUT_OF_MEMORY, RENDER_FAILED };
 
 /* Renders a valid scene; a map that it names must be there. cancelled may be NULL. On RENDER_OK the caller owns frame->pixels
- * (frame_finish); else the frame is zeroed and one log line says why. A scene of MODEL_REFERENCE with model.partial that is cancelled after its
- * first samples is RENDER_OK, frame->partial. */
+ * (frame_finish); else the frame is zeroed and one log line says why. A scene of MODEL_REFERENCE with model.partial that is cancelled after
+ * its first samples is RENDER_OK, frame->partial. */
 enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
 				   struct frame *frame);
 

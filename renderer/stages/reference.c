@@ -14,7 +14,7 @@ enum {
 	HEIGHT_SIDE = 1024, /* of the field's height, as in shaders/lib/height.glsl */
 	TOPS_SIDE_MIN = 1024,
 	TOPS_SIDE_MAX = 4096,
-	FIXED = 3, /* sums that every picture has: color, its part left to chance, and the square of that */
+	FIXED = 3,                        /* sums that every picture has: color, its part left to chance, and the square of that */
 	GROUP = PASS_OUTPUTS_MAX - FIXED, /* layers that one run adds to beside them */
 	GROUPS = (LAYER_COUNT + GROUP - 1) / GROUP,
 	SAMPLES_A_PASS = 16
@@ -79,13 +79,13 @@ static const struct pass *paths_pass(struct reference_stage *stage, const struct
 	const bool layers = work->slot_count > 0;
 	struct pass **pass = &stage->paths[work->side][layers][projection][large][work->ground];
 	char defines[200];
-	const struct pass_desc desc = {
-		.file = "shaders/passes/reference.glsl",
-		.defines = defines,
-		.outputs = layers ? FIXED + GROUP : FIXED,
-		.samplers = {"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "phase_table",
-			     "path_tops", "path_bounds", "phase_inverse", "forward_chains", "sky_at_layer", "sky_at_ground"},
-		.adds = true};
+	const struct pass_desc desc = {.file = "shaders/passes/reference.glsl",
+				       .defines = defines,
+				       .outputs = layers ? FIXED + GROUP : FIXED,
+				       .samplers = {"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end",
+						    "ground_map", "phase_table", "path_tops", "path_bounds", "phase_inverse",
+						    "forward_chains", "sky_at_layer", "sky_at_ground"},
+				       .adds = true};
 	snprintf(defines, sizeof defines,
 		 "#define REFERENCE_ABOVE %d\n#define REFERENCE_LAYERS %d\n#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n"
 		 "#define VIEW_GROUND %d\n",
@@ -128,7 +128,8 @@ static int tops_side(const struct scene *scene, enum view_side side)
 	return texels;
 }
 
-/* The largest height in squares of the tile, and then in those and their eight neighbours, so that it holds for as far as a square reaches. */
+/* The largest height in squares of the tile, and then in those and their eight neighbours, so that it holds for as far as a square reaches.
+ */
 static void find_bounds(const float *tops, int side, float bounds[BOUNDS_SIDE][BOUNDS_SIDE])
 {
 	static _Thread_local float own[BOUNDS_SIDE][BOUNDS_SIDE];
@@ -141,8 +142,9 @@ static void find_bounds(const float *tops, int side, float bounds[BOUNDS_SIDE][B
 		for (int x = 0; x < BOUNDS_SIDE; x++) {
 			bounds[y][x] = 0;
 			for (int k = 0; k < 9; k++)
-				bounds[y][x] = fmaxf(bounds[y][x], own[(y + k / 3 + BOUNDS_SIDE - 1) % BOUNDS_SIDE]
-								      [(x + k % 3 + BOUNDS_SIDE - 1) % BOUNDS_SIDE]);
+				bounds[y][x] = fmaxf(
+					bounds[y][x],
+					own[(y + k / 3 + BOUNDS_SIDE - 1) % BOUNDS_SIDE][(x + k % 3 + BOUNDS_SIDE - 1) % BOUNDS_SIDE]);
 		}
 }
 
@@ -316,8 +318,8 @@ static enum outcome run_round(struct reference_stage *stage, struct stage_contex
 }
 
 static enum outcome run_rounds(struct reference_stage *stage, struct stage_context *context, const struct scene *scene,
-			       const struct reference_inputs *inputs, renderer_cancelled *cancelled, void *cancel_context, struct work *work,
-			       int *samples)
+			       const struct reference_inputs *inputs, renderer_cancelled *cancelled, void *cancel_context,
+			       struct work *work, int *samples)
 {
 	const double begin = clock_milliseconds(), budget = scene->model.time_budget_ms;
 	struct round round = {.deadline = budget > 0 ? begin + budget : 0, .cancelled = cancelled, .cancel_context = cancel_context};
@@ -376,7 +378,8 @@ bool reference_stage_run(struct reference_stage *stage, struct stage_context *co
 	context->reused = false;
 	drop_last(stage);
 	if (disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(scene->camera.position_m[2]), inputs->view->sun_cover) &&
-	    make_tops(stage, scene, inputs->view, &work) && make_droplets(stage, inputs->view, &work) && make_sums(scene, layers, count, &work))
+	    make_tops(stage, scene, inputs->view, &work) && make_droplets(stage, inputs->view, &work) &&
+	    make_sums(scene, layers, count, &work))
 		outcome = run_rounds(stage, context, scene, inputs, cancelled, cancel_context, &work, &result->samples);
 	result->stopped = outcome == OUTCOME_STOPPED;
 	bool ok = outcome == OUTCOME_DONE || outcome == OUTCOME_TIME_OVER ||

@@ -1,9 +1,10 @@
 /* The reference model: the picture by unbiased Monte Carlo path tracing, in place of the view stage.
  *
- * Light paths go backwards from the camera through the cloud as a volume, over the ground and back, until the sky ends them, and look for the sun on
- * their way (shaders/lib/light_path_sun.glsl says how). Sky, air before the first thing that a path meets, heights of the tops, droplets and ground are
- * those of the slab's view; light between ground and clouds is followed, not solved. Not followed is the air between what a path meets after
- * the first: light from the ground reaches the clouds as it leaves it, sky and sun are those of the place where a path ends.
+ * Light paths go backwards from the camera through the cloud as a volume, over the ground and back, until the sky ends them, and look for
+ * the sun on their way (shaders/lib/light_path_sun.glsl says how). Sky, air before the first thing that a path meets, heights of the tops,
+ * droplets and ground are those of the slab's view; light between ground and clouds is followed, not solved. Not followed is the air
+ * between what a path meets after the first: light from the ground reaches the clouds as it leaves it, sky and sun are those of the place
+ * where a path ends.
  *
  * Nothing of it is remembered: pictures that took this long are kept elsewhere.
  */
@@ -40,9 +41,9 @@ struct reference_result {
 void reference_stage_init(struct reference_stage *stage, const struct pass_compiler *compiler);
 void reference_stage_finish(struct reference_stage *stage);
 
-/* Renders layers[0..count) into textures of the output's size, valid until the next call. Ends with scene->model.samples, when its time is over, or, with
- * scene->model.partial, when cancelled after the first sample of every pixel. cancelled may be NULL; it is asked every 50 ms or so. false when
- * cancelled otherwise, out of memory, or when a program does not compile. */
+/* Renders layers[0..count) into textures of the output's size, valid until the next call. Ends with scene->model.samples, when its time is
+ * over, or, with scene->model.partial, when cancelled after the first sample of every pixel. cancelled may be NULL; it is asked every 50 ms
+ * or so. false when cancelled otherwise, out of memory, or when a program does not compile. */
 bool reference_stage_run(struct reference_stage *stage, struct stage_context *context, const struct scene *scene,
 			 const struct reference_inputs *inputs, const enum layer *layers, int count, renderer_cancelled *cancelled,
 			 void *cancel_context, const struct texture **pictures, struct reference_result *result);

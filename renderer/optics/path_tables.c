@@ -103,8 +103,8 @@ static void disc_draw(double direction[3], double radius, struct photon_random *
 	direction[2] = sqrt(1 - sine * sine);
 }
 
-static void chain_draw(float chain[PATH_CHAIN_LENGTH][4], const struct droplet_tables *tables, const struct peak *peak, int hero, double radius,
-		       struct photon_random *random)
+static void chain_draw(float chain[PATH_CHAIN_LENGTH][4], const struct droplet_tables *tables, const struct peak *peak, int hero,
+		       double radius, struct photon_random *random)
 {
 	double direction[3], ratio[2] = {1, 1};
 	disc_draw(direction, radius, random);

@@ -16,8 +16,8 @@ enum {
 	PATH_CHAIN_ROWS = 64
 };
 
-/* Per band the inverse of the share of light that is scattered by less than an angle: angles as units of the phase table's columns, 0 forward, 1
- * backward, for shares even from 0 to 1. */
+/* Per band the inverse of the share of light that is scattered by less than an angle: angles as units of the phase table's columns, 0
+ * forward, 1 backward, for shares even from 0 to 1. */
 struct path_inverse {
 	float unit[PATH_INVERSE_COLUMNS][4];
 };
@@ -25,9 +25,9 @@ struct path_inverse {
 /* Of the phase function as the phase table's interpolation has it. */
 void path_inverse_fill(struct path_inverse *inverse, const struct droplet_tables *tables);
 
-/* Chains for each band as hero. [0] is a direction in the sun's disc, every further one the one before it, turned by a scattering within the forward
- * peak: x and y are its components aside of the middle of the sun; then, of the next two bands in turn, the density of all the chain's scatterings over that of
- * the hero, extinctions included. */
+/* Chains for each band as hero. [0] is a direction in the sun's disc, every further one the one before it, turned by a scattering within
+ * the forward peak: x and y are its components aside of the middle of the sun; then, of the next two bands in turn, the density of all the
+ * chain's scatterings over that of the hero, extinctions included. */
 struct path_chains {
 	float chain[BAND_COUNT][PATH_CHAIN_ROWS][PATH_CHAINS_A_ROW][PATH_CHAIN_LENGTH][4];
 };

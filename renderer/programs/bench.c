@@ -76,7 +76,8 @@ static void usage(FILE *to)
 		    "                    [-S SEED] [-r RESOLUTION] [-R] [-o FILE.ppm|FILE.pfm] [-l LAYER] [NAME=VALUE ...]\n"
 		    "Renders the default scene with these changes and prints milliseconds per stage of the first frame, of a repeated one "
 		    "with the\n"
-		    "camera turned, and of one with another time. -l says which layer a PFM gets. -R switches the radiosity off. NAME is a member as in JSON (camera.z_m "
+		    "camera turned, and of one with another time. -l says which layer a PFM gets. -R switches the radiosity off. NAME is a "
+		    "member as in JSON (camera.z_m "
 		    "for heights).\n");
 }
 
@@ -159,7 +160,8 @@ static int compare_floats(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* Median over the pixels of the standard error of their luminance (as if its channels erred together) over it; layers as main asks for them. */
+/* Median over the pixels of the standard error of their luminance (as if its channels erred together) over it; layers as main asks for
+ * them. */
 static double median_error(const struct frame *frame)
 {
 	static const double weight[] = {0.2126, 0.7152, 0.0722};

@@ -14,7 +14,7 @@ enum {
 	HEIGHT_SIDE = 1024, /* of the field's height, as in shaders/lib/height.glsl */
 	TOPS_SIDE_MIN = 1024,
 	TOPS_SIDE_MAX = 4096,
-	FIXED = 3, /* sums that every picture has: color, its part left to chance, and the square of that */
+	FIXED = 3,                        /* sums that every picture has: color, its part left to chance, and the square of that */
 	GROUP = PASS_OUTPUTS_MAX - FIXED, /* layers that one run adds to beside them */
 	GROUPS = (LAYER_COUNT + GROUP - 1) / GROUP,
 	SAMPLES_A_PASS = 16
@@ -100,13 +100,13 @@ static const struct pass *paths_pass(struct reference_stage *stage, const struct
 	const bool layers = work->slot_count > 0;
 	struct pass **pass = &stage->paths[work->side][layers][projection][large][work->ground];
 	char defines[200];
-	const struct pass_desc desc = {
-		.file = "shaders/passes/reference.glsl",
-		.defines = defines,
-		.outputs = layers ? FIXED + GROUP : FIXED,
-		.samplers = {"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end", "ground_map", "phase_table",
-			     "path_tops", "path_bounds", "phase_inverse", "forward_chains", "sky_at_layer", "sky_at_ground"},
-		.adds = true};
+	const struct pass_desc desc = {.file = "shaders/passes/reference.glsl",
+				       .defines = defines,
+				       .outputs = layers ? FIXED + GROUP : FIXED,
+				       .samplers = {"transmittance_table", "sky_total", "sky_near", "air_to_layer", "air_to_end",
+						    "ground_map", "phase_table", "path_tops", "path_bounds", "phase_inverse",
+						    "forward_chains", "sky_at_layer", "sky_at_ground"},
+				       .adds = true};
 	snprintf(defines, sizeof defines,
 		 "#define REFERENCE_ABOVE %d\n#define REFERENCE_LAYERS %d\n#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n"
 		 "#define VIEW_GROUND %d\n",

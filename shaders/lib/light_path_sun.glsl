@@ -16,20 +16,22 @@
 const int PATH_CHAIN_LENGTH = 16;
 const int PATH_CHAIN_ROWS = 64;
 // The way to the sun is looked at in so many parts, short ones first.
-const int PATH_PARTS = 10;
+const int PATH_PARTS = 16;
+const float PATH_PARTS_BEND = 12.0;
 // Where no cloud is expected there may be some: share of the forward scatterings looked for beside cloud, and away from it.
 const float PATH_BESIDE = 0.4;
-const float PATH_AWAY = 0.1;
+const float PATH_AWAY = 0.15;
 
 // Where a part begins, over the whole way; and the part at a place.
 float path_part_start(int part)
 {
-	return float(part * (part + 4)) * (1.0 / float(PATH_PARTS * (PATH_PARTS + 4)));
+	return float(part) * (float(part) + PATH_PARTS_BEND) * (1.0 / (float(PATH_PARTS) * (float(PATH_PARTS) + PATH_PARTS_BEND)));
 }
 
 int path_part_at(float way)
 {
-	return min(int(sqrt(4.0 + float(PATH_PARTS * (PATH_PARTS + 4)) * max(way, 0.0)) - 2.0), PATH_PARTS - 1);
+	float middle = 0.5 * PATH_PARTS_BEND;
+	return min(int(sqrt(middle * middle + float(PATH_PARTS) * (float(PATH_PARTS) + PATH_PARTS_BEND) * max(way, 0.0)) - middle), PATH_PARTS - 1);
 }
 
 bool path_part_cloudy(int cloudy, int part)

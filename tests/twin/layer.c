@@ -43,8 +43,8 @@ static void fill_textures(struct uniform_layer *layer)
 	set_texture(twin, TWIN_BOUNDS, layer->bounds, BOUNDS_SIDE, BOUNDS_SIDE, true, true);
 	set_texture(twin, TWIN_PHASE, layer->phase, DROPLET_PHASE_COLUMNS, 2, false, false);
 	set_texture(twin, TWIN_INVERSE, &layer->inverse->unit[0][0], PATH_INVERSE_COLUMNS, 1, false, false);
-	set_texture(twin, TWIN_CHAINS, &layer->chains->chain[0][0][0][0][0], PATH_CHAINS_A_ROW * PATH_CHAIN_LENGTH, BAND_COUNT * PATH_CHAIN_ROWS,
-		    false, true);
+	set_texture(twin, TWIN_CHAINS, &layer->chains->chain[0][0][0][0][0], PATH_CHAINS_A_ROW * PATH_CHAIN_LENGTH,
+		    BAND_COUNT * PATH_CHAIN_ROWS, false, true);
 }
 
 static void fill_block(struct uniform_layer *layer)

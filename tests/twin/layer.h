@@ -26,8 +26,9 @@ struct uniform_layer {
 void layer_init(struct uniform_layer *layer, const struct layer_case *is);
 void layer_finish(struct uniform_layer *layer);
 
-/* Mean of a layer of the picture (enum layer) and its standard error, per band, seen from just below or above the layer in a direction that goes up or down; zenith is
- * that of the direction reversed when it goes down. relative_azimuth: between the headings of sun's light and the view's, as in renderer/optics/slab.h. */
+/* Mean of a layer of the picture (enum layer) and its standard error, per band, seen from just below or above the layer in a direction that
+ * goes up or down; zenith is that of the direction reversed when it goes down. relative_azimuth: between the headings of sun's light and
+ * the view's, as in renderer/optics/slab.h. */
 struct layer_seen {
 	double mean[3], error[3];
 };

@@ -66,10 +66,11 @@ static const float *sun_disc_weights;
 #define STORE(index, value) stored[index] = (value)
 
 #define TWIN_BLOCK(X)                                                                                                                      \
-	X(sun_direction) X(sun_at_camera) X(solar_irradiance) X(rayleigh) X(aerosol) X(aerosol_shape) X(ozone) X(ground_albedo)            \
-	X(ground_patch) X(ground_mean_albedo) X(camera_position) X(camera_right) X(camera_up) X(camera_forward) X(image_size)              \
-	X(sun_disc_box) X(cloud_layer) X(cloud_drift) X(extinction) X(extinction_modified) X(air_below) X(air_around) X(band_red)          \
-	X(band_green) X(band_blue) X(sky_irradiance_ground)
+	X(sun_direction)                                                                                                                   \
+	X(sun_at_camera) X(solar_irradiance) X(rayleigh) X(aerosol) X(aerosol_shape) X(ozone) X(ground_albedo) X(ground_patch)             \
+		X(ground_mean_albedo) X(camera_position) X(camera_right) X(camera_up) X(camera_forward) X(image_size) X(sun_disc_box)      \
+			X(cloud_layer) X(cloud_drift) X(extinction) X(extinction_modified) X(air_below) X(air_around) X(band_red)          \
+				X(band_green) X(band_blue) X(sky_irradiance_ground)
 #define TWIN_MEMBER(name) static vec4 name;
 TWIN_BLOCK(TWIN_MEMBER)
 #undef TWIN_MEMBER
@@ -98,9 +99,9 @@ namespace above
 static void bind(const twin &twin)
 {
 	using namespace glsl;
-	sampler2D *const samplers[TWIN_SAMPLER_COUNT] = {
-		&transmittance_table, &sky_total,   &sky_near,      &air_to_layer,   &air_to_end,   &ground_map,   &phase_table,
-		&path_tops,           &path_bounds, &phase_inverse, &forward_chains, &sky_at_layer, &sky_at_ground};
+	sampler2D *const samplers[TWIN_SAMPLER_COUNT] = {&transmittance_table, &sky_total,    &sky_near,     &air_to_layer, &air_to_end,
+							 &ground_map,          &phase_table,  &path_tops,    &path_bounds,  &phase_inverse,
+							 &forward_chains,      &sky_at_layer, &sky_at_ground};
 	for (int i = 0; i < TWIN_SAMPLER_COUNT; i++)
 		*samplers[i] = &twin.texture[i];
 	set_block(twin.block);
@@ -124,8 +125,8 @@ extern "C" void twin_run(const struct twin *twin, int width, int height, int fir
 				twin->above ? glsl::above::pass(pixel) : glsl::below::pass(pixel);
 				for (int i = 0; i < TWIN_OUTPUTS; i++)
 					for (int k = 0; outputs[i] && k < 4; k++)
-						outputs[i][4 * ((std::size_t)row * (std::size_t)width + (std::size_t)column) + (std::size_t)k] +=
-							glsl::stored[i][k];
+						outputs[i][4 * ((std::size_t)row * (std::size_t)width + (std::size_t)column) +
+							   (std::size_t)k] += glsl::stored[i][k];
 			}
 	};
 	std::vector<std::thread> others;

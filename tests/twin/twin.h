@@ -1,5 +1,5 @@
-/* The reference model on the processor: shaders/passes/reference.glsl compiled as C++ and run on threads, for tests to hold against the shader
- * and against what is known of layers that no request can name. Any thread.
+/* The reference model on the processor: shaders/passes/reference.glsl compiled as C++ and run on threads, for tests to hold against the
+ * shader and against what is known of layers that no request can name. Any thread.
  */
 #ifndef STRATUS_TESTS_TWIN_H
 #define STRATUS_TESTS_TWIN_H
@@ -41,7 +41,7 @@ struct twin {
 	struct twin_texture texture[TWIN_SAMPLER_COUNT];
 	bool above;
 	uint32_t seed, paths;
-	int layer[TWIN_LAYERS]; /* enum layer; -1: none */
+	int layer[TWIN_LAYERS];    /* enum layer; -1: none */
 	const float *disc_weights; /* three bands a pixel of the block's sun_disc_box; NULL: none is seen */
 };
 

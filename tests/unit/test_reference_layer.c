@@ -1,5 +1,6 @@
-/* The reference model in a uniform layer, where the answer is known: against the solved slab, against single scattering in closed form, and in a furnace, where
- * everything is as bright as its surroundings. By the twin on the processor. Wants build/mie.kernel, or the file that STRATUS_KERNEL names. */
+/* The reference model in a uniform layer, where the answer is known: against the solved slab, against single scattering in closed form, and
+ * in a furnace, where everything is as bright as its surroundings. By the twin on the processor. Wants build/mie.kernel, or the file that
+ * STRATUS_KERNEL names. */
 #include "renderer/optics/kernel.h"
 #include "tests/twin/layer.h"
 

@@ -42,14 +42,14 @@ const struct bound bounds[BOUND_COUNT] = {
 	{"the same over the zenith's", TALLY_SKY_PHOTONS_RELATIVE, STATISTIC_WORST, 0.10, 1, "%"},
 	{"colour of sun and sky, three bands against a spectrum, in x, y", TALLY_SKY_COLOUR, STATISTIC_WORST, 0.02, 1, ""},
 	{"luminance likewise", TALLY_SKY_LUMINANCE, STATISTIC_WORST, 0.12, 1, "%"},
-	{"light paths in uniform layers, radiance against the solver: within 3 standard errors", TALLY_PATHS_LAYER, STATISTIC_SHARE, 0.97, 1,
-	 "%"},
+	{"light paths in uniform layers, radiance against the solver: within 3 standard errors", TALLY_PATHS_LAYER, STATISTIC_SHARE, 0.98,
+	 1, "%"},
 	{"R, T likewise, worst, in 3 standard errors", TALLY_PATHS_FLUX, STATISTIC_WORST, 1, 1, ""},
 	{"standard error of those radiances, largest", TALLY_PATHS_ERROR, STATISTIC_WORST, 0.01, 1, "%"},
 	{"light paths in a thin layer against single scattering", TALLY_PATHS_THIN, STATISTIC_WORST, 0.01, 1, "%"},
 	{"light paths in a white furnace, from 1", TALLY_PATHS_FURNACE, STATISTIC_WORST, 0.01, 1, "%"},
-	/* Hopelessly missed by software OpenGL so far: shown, but no failure of the run. */
-	{"broken deck of 320 x 240 to a median standard error of 5 %, two processors", TALLY_PATHS_TIME, STATISTIC_WORST, 60, 100, "s"},
+	/* Missed by software OpenGL by far: shown, but no failure of the run. */
+	{"broken deck of 320 x 240 to a median standard error of 5 %, two processors", TALLY_PATHS_TIME, STATISTIC_WORST, 60e3, 100, "ms"},
 };
 
 void tally_add(struct tally *tally, double error, const char *format, ...)

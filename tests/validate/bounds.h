@@ -51,7 +51,7 @@ enum tally_id {
 	TALLY_PATHS_ERROR,
 	TALLY_PATHS_THIN, /* relative, these two */
 	TALLY_PATHS_FURNACE,
-	TALLY_PATHS_TIME, /* s */
+	TALLY_PATHS_TIME, /* ms */
 	TALLY_COUNT
 };
 

@@ -54,7 +54,8 @@ static void compare_radiances(const struct check *check, struct uniform_layer *l
 	for (int i = 0; i < effort_count(check->validation, DIRECTIONS); i++) {
 		/* Even over both hemispheres, but not within 10 degrees of the horizon. */
 		const bool above = i % 2;
-		const double mu_v = 0.17 + 0.83 * (i + 0.5) / DIRECTIONS, turns = i * 0.61803398875, azimuth = M_PI * (turns - floor(turns));
+		const double mu_v = 0.17 + 0.83 * (i + 0.5) / DIRECTIONS, turns = i * 0.61803398875,
+			     azimuth = M_PI * (turns - floor(turns));
 		const enum slab_side side = above ? SLAB_REFLECTED : SLAB_TRANSMITTED;
 		if (scattering_cosine(side, mu_l, mu_v, azimuth) > cos(5 * DEGREE))
 			continue;
@@ -214,8 +215,8 @@ static void measure_time(const struct check *check)
 	require(renderer_render(renderer, &scene, NULL, NULL, &frame) == RENDER_OK, "no picture");
 	const double took = processor_s() - begin, all = median_error(&frame, false), cloud = median_error(&frame, true);
 	/* Errors fall with the root of the samples. */
-	const double worse = fmax(all, cloud), needed = took * pow(worse / 0.05, 2);
-	tally_add(&check->validation->measured.tally[TALLY_PATHS_TIME], needed / 2,
+	const double worse = fmax(all, cloud), needed_ms = 1e3 * took * pow(worse / 0.05, 2);
+	tally_add(&check->validation->measured.tally[TALLY_PATHS_TIME], needed_ms / 2,
 		  "%d samples in %.1f s of a processor; median error %.1f %% of all, %.1f %% of cloud", frame.samples, took, 100 * all,
 		  100 * cloud);
 	frame_finish(&frame);

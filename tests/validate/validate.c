@@ -88,14 +88,21 @@ static const struct part {
 	void (*run)(struct validation *validation);
 } parts[] = {
 	/* Times first, while nothing else of this program has filled the caches. */
-	{"times", validate_times},     {"data", validate_reference},
+	{"times", validate_times},
+	{"data", validate_reference},
 	{"reference", validate_paths},
-	{"spheres", validate_spheres}, {"conservation", validate_conservation},
-	{"lookup", validate_lookup},   {"photons", validate_photons},
-	{"sky", validate_sky},         {"ground", validate_ground},
-	{"figure 4", figure_phase},    {"figure 6", figure_orders},
-	{"figure 8", figure_fluxes},   {"figure 9", figure_radiance},
-	{"passes", figure_passes},     {"water sky", figure_water_sky},
+	{"spheres", validate_spheres},
+	{"conservation", validate_conservation},
+	{"lookup", validate_lookup},
+	{"photons", validate_photons},
+	{"sky", validate_sky},
+	{"ground", validate_ground},
+	{"figure 4", figure_phase},
+	{"figure 6", figure_orders},
+	{"figure 8", figure_fluxes},
+	{"figure 9", figure_radiance},
+	{"passes", figure_passes},
+	{"water sky", figure_water_sky},
 };
 
 static double now_s(void)

@@ -58,7 +58,7 @@ void validate_lookup(struct validation *validation);       /* the shader */
 void validate_photons(struct validation *validation);      /* Monte Carlo */
 void validate_ground(struct validation *validation);       /* light between ground and clouds */
 void validate_sky(struct validation *validation);          /* the clear sky; writes the page sky.md */
-void validate_paths(struct validation *validation);      /* the reference model */
+void validate_paths(struct validation *validation);        /* the reference model */
 void validate_times(struct validation *validation);        /* the store */
 
 /* The paper's figures: data files in the folder, text onto the page. */

@@ -81,6 +81,7 @@ static void fill_block(struct scene_block *block, const struct scene_clouds *clo
 	block->cloud_layer[3] = clouds->type != CLOUD_NONE && clouds->thickness_m > 0 ? 1.0f : 0.0f;
 	block->cloud_threshold[3] = (float)clouds->resolution;
 	field_noise_fill_block(block, clouds);
+	height_puffs_fill_block(block, clouds);
 	if (clouds->map.map) /* nothing is added to what a map says */
 		block->cloud_field[1] = block->cloud_field[3] = block->cloud_detail[3] = 0;
 }
@@ -338,7 +339,8 @@ static bool thickness_get(const struct field_stage *stage, struct stage_context 
 		return true;
 	maps->height = height_field_get(stage, context, scene, coarse);
 	maps->light = maps->height ? height_light_get(&stage->light, context, scene, maps->height) : NULL;
-	return maps->light;
+	maps->puffs = maps->light ? height_puffs_get(context) : NULL;
+	return maps->puffs;
 }
 
 /* Packed pictures take six times the memory. */

@@ -6,10 +6,8 @@
 
 /* Pixels a side of the blocks, as in shaders/lib/height_march.glsl. */
 enum { BLOCK = 8 };
-/* Distance within which there are puffs, m, as in shaders/lib/height_detail.glsl. */
-static const double near_m = 1500;
 
-static struct pass *create_pass(const struct pass_compiler *compiler, const char *file, int outputs, enum projection projection, bool near)
+static struct pass *create_pass(const struct pass_compiler *compiler, const char *file, int outputs, enum projection projection, int near)
 {
 	char defines[96];
 	struct pass_desc desc = {.file = file,
@@ -18,16 +16,16 @@ static struct pass *create_pass(const struct pass_compiler *compiler, const char
 				 .samplers = {"height_table", "height_light", "smooth_table", "height_start"}};
 	snprintf(defines, sizeof defines, "#define VIEW_PROJECTION %d\n#define HEIGHT_NEAR %d\n", projection, near);
 	if (near)
-		desc.samplers[4] = "field_detail";
+		desc.samplers[4] = "height_puffs";
 	return pass_create(compiler, &desc);
 }
 
 /* Both programs for a projection; false after log lines. */
-static bool has_passes(struct height_view_stage *stage, enum projection projection, bool near)
+static bool has_passes(struct height_view_stage *stage, enum projection projection, int near)
 {
 	struct pass **start = &stage->start[projection], **view = &stage->view[projection][near];
 	if (!*start)
-		*start = create_pass(&stage->compiler, "shaders/passes/height_start.glsl", 1, projection, false);
+		*start = create_pass(&stage->compiler, "shaders/passes/height_start.glsl", 1, projection, 0);
 	if (!*view)
 		*view = create_pass(&stage->compiler, "shaders/passes/height_view.glsl", 2, projection, near);
 	return *start && *view;
@@ -36,14 +34,14 @@ static bool has_passes(struct height_view_stage *stage, enum projection projecti
 bool height_view_init(struct height_view_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
-	return has_passes(stage, PROJECTION_PERSPECTIVE, false) && has_passes(stage, PROJECTION_PERSPECTIVE, true);
+	return has_passes(stage, PROJECTION_PERSPECTIVE, 1);
 }
 
 void height_view_finish(struct height_view_stage *stage)
 {
 	for (int i = 0; i < PROJECTION_COUNT; i++) {
 		pass_destroy(stage->start[i]);
-		stage_destroy_passes(stage->view[i], 2);
+		stage_destroy_passes(stage->view[i], 3);
 	}
 	*stage = (struct height_view_stage){0};
 }
@@ -64,7 +62,7 @@ bool height_view_create(const struct scene *scene, struct height_view *seen)
 bool height_view_run(struct height_view_stage *stage, const struct scene *scene, const struct camera_view *view,
 		     const struct field_maps *field, struct height_view *seen)
 {
-	const bool near = scene->camera.position_m[2] - scene->clouds.base_m - scene->clouds.thickness_m < near_m;
+	const int near = scene->clouds.map.map ? 0 : scene->clouds.tile_m > 40000 ? 2 : 1;
 	if (!has_passes(stage, view->projection, near))
 		return false;
 	/* Blocks of two views at once are made anew for the second, when the first has been drawn. */
@@ -79,7 +77,7 @@ bool height_view_run(struct height_view_stage *stage, const struct scene *scene,
 				    .width = seen->place.width,
 				    .first_row = view->first_row,
 				    .height = view->height,
-				    .samplers = {field->height, field->light, field->smooth, &seen->start, field->detail}});
+				    .samplers = {field->height, field->light, field->smooth, &seen->start, field->puffs}});
 	return true;
 }
 

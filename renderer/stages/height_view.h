@@ -11,8 +11,8 @@
 
 struct height_view_stage {
 	struct pass_compiler compiler;
-	/* By projection; the second from afar, and near. Those of panoramas are made with the first one. */
-	struct pass *start[PROJECTION_COUNT], *view[PROJECTION_COUNT][2];
+	/* By projection; the second with puffs, without and with smaller ones. Those of panoramas are made with the first one. */
+	struct pass *start[PROJECTION_COUNT], *view[PROJECTION_COUNT][3];
 };
 
 /* What shaders/passes/height_view.glsl stores. */

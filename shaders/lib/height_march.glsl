@@ -52,6 +52,7 @@ float height_block_start(vec3 direction, vec2 range, float radius)
 	// Rays of the block that point further down reach the layer earlier.
 	float t = range.x * max(1.0 - radius / max(-direction.z, radius), 0.0);
 	float level = 4.0;
+	float puffs = HEIGHT_PUFF_TOP * height_puff_scale(cloud_layer.y);
 	for (int i = 0; i < HEIGHT_ITERATIONS; i++) {
 		if (t >= range.y)
 			break;
@@ -61,7 +62,7 @@ float height_block_start(vec3 direction, vec2 range, float radius)
 		float around = radius * (t + hop);
 		float lowest = min(height_of_ray(direction.z, t), height_of_ray(direction.z, t + hop)) - around;
 		bool wide = 0.25 * cell >= around;
-		if (wide && lowest > height_tap(origin + rate * (t + 0.5 * hop), level).y + HEIGHT_PUFF_TOP * HEIGHT_PUFF) {
+		if (wide && lowest > height_tap(origin + rate * (t + 0.5 * hop), level).y + puffs) {
 			t += hop;
 			level = min(level + 1.0, HEIGHT_LEVEL_MAX);
 		} else {
@@ -89,8 +90,8 @@ height_path height_path_clear()
 	return path;
 }
 
-// Share of a step that lies in cloud, from the gaps between ray and top at its ends; `soft`: height over which the top varies in what the field does not
-// resolve.
+// Share of a step that lies in cloud, from the gaps between ray and top at its ends. `soft`: height over which rays of the pixel differ, and the top in what
+// the field does not resolve.
 float height_inside(float gap_before, float gap, float soft)
 {
 	return clamp(0.5 - 0.5 * (gap_before + gap) / max(abs(gap - gap_before) + soft, 1e-3), 0.0, 1.0);
@@ -102,7 +103,7 @@ float height_scattered(float depth)
 	return 1.0 - 1.0 / (1.0 + depth * (1.0 + depth * (0.5 + depth * (1.0 / 6.0))));
 }
 
-// HEIGHT_NEAR: puffs are looked for.
+// HEIGHT_NEAR: puffs stand on the tops (1), and smaller ones on them (2).
 // range: where to look, m. pixel_angle: angle between pixels.
 height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 {
@@ -114,6 +115,8 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 	float spread = pixel_angle * inversesqrt(clamp(-direction.z, 0.02, 1.0));
 	// Steps short enough that a steep ray does not pass the layer in one.
 	float longest = cloud_layer.y / max(-direction.z, 0.01) * (1.0 / 16.0);
+	// Inside, the way between two scatterings needs no more than a few steps.
+	float dense = 0.3 / extinction_scaled.y;
 	height_path path = height_path_clear();
 	float t = range.x;
 	float level = 1.0;
@@ -124,63 +127,76 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 	// Distances are means over the outermost droplets: further in, a ray through a crest would find the side behind.
 	float outer = 1.0;
 	vec2 outer_weight = vec2(0.0);
+	// A crest hides no more of a pixel than it reaches up into it, however long the way through it is: what is left at least.
+	float clear_before = 1.0;
+	float highest = 0.0;
 	for (int i = 0; i < HEIGHT_ITERATIONS; i++) {
 		if (t > range.y || path.clear < HEIGHT_OPAQUE)
 			break;
-		float width = max(spread * t, texel); // of what a pixel covers
-		bool fine = cell <= width;
+		float width = spread * t; // of what a pixel covers
+		float coarse = max(width, texel);
+		bool fine = cell <= coarse;
 		// A value between texels holds for half a cell around, so it is taken in the middle of the way that it is wanted for.
 		float hop = cell * slowness;
 		float z = height_of_ray(direction.z, t);
 		float z_hop = height_of_ray(direction.z, t + hop);
-		vec2 tap = height_tap(origin + rate * (fine ? t : t + 0.5 * hop), level);
+		vec2 tap = height_tap(origin + rate * (fine ? t : t + 0.5 * hop), fine ? log2(coarse / texel) : level);
 #if HEIGHT_NEAR
-		float puff_depth = height_puff_depth(tap.x, t);
-		tap.y += HEIGHT_PUFF_TOP * puff_depth;
+		float top = tap.y + HEIGHT_PUFF_TOP * height_puff_scale(tap.y);
+#else
+		float top = tap.y;
 #endif
-		if (!fine && min(z, z_hop) > tap.y) {
+		if (!fine && min(z, z_hop) > top) {
 			t += hop;
 			level = min(level + 1.0, HEIGHT_LEVEL_MAX);
 			cell = min(2.0 * cell, exp2(HEIGHT_LEVEL_MAX) * texel);
 			before = -1.0;
-			if (!behind && path.weight.x > 0.0) {
+			if (path.weight.x > 0.0) {
+				outer = behind ? outer : 1.0;
 				behind = true;
-				outer = 1.0;
 			}
+			clear_before = path.clear;
+			highest = 0.0;
 		} else if (!fine) {
 			level -= 1.0;
 			cell *= 0.5;
 		} else {
 			// Where there is no cloud, what the base's height is off by is none either.
 			float gap = z - tap.x + 3.0 * max(1.0 - tap.x, 0.0);
-			float stride = 0.7 * width + (gap > 0.0 ? 0.35 : -0.8) * gap;
+			float finest = coarse;
 #if HEIGHT_NEAR
-			if (puff_depth > 0.0) {
-				float finest = max(spread * t, 0.3 * texel);
-				gap -= puff_depth * height_puff((origin + rate * t) * cloud_layer.z + vec2(cloud_drift.x, cloud_drift.y), finest);
-				stride = mix(stride, 0.7 * finest + (gap > 0.0 ? 0.35 : -0.8) * gap, puff_depth / HEIGHT_PUFF);
-			}
+			finest = max(width, 0.25 * texel);
+			gap -= height_puff_scale(tap.x) * height_puff((origin + rate * t) * cloud_layer.z, z, finest).x;
 #endif
+			float stride = gap > 0.0 ? 0.7 * finest + 0.4 * gap : max(0.7 * finest, dense) - 0.8 * gap;
+			// Half a pixel above a crest some of it still is in the pixel.
+			float soft = pixel_angle * t + 0.2 * (tap.y - tap.x) * clamp(width / texel - 1.0, 0.0, 1.0);
 			if (before >= 0.0) {
 				float length_m = t - before;
-				float soft = (tap.y - tap.x) * min(width / texel - 1.0, 1.0);
 				float inside = height_inside(gap_before, gap, soft);
-				float seen = path.clear * inside * height_scattered(extinction_scaled.y * length_m);
-				float outermost = outer * inside * height_scattered(4.0 * extinction_scaled.y * length_m);
+				if (inside == 0.0) {
+					clear_before = path.clear;
+					highest = 0.0;
+					if (!behind && path.weight.x > 0.02) {
+						behind = true;
+						outer = 1.0;
+					}
+				}
+				highest = max(highest, inside);
+				float seen = min(path.clear * inside * height_scattered(extinction_scaled.y * length_m),
+				                 max(path.clear - clear_before * (1.0 - highest), 0.0));
+				// However little of the pixel is in the crest, it is seen where it is met.
+				float outermost = inside > 0.0 ? outer * height_scattered(4.0 * extinction_scaled.y * length_m) : 0.0;
 				// Where in the step: at its end on the way in.
 				float middle = gap < gap_before ? t - 0.75 * inside * length_m : before + 0.25 * inside * length_m;
-				if (!behind && path.weight.x > 0.02 && inside == 0.0) {
-					behind = true;
-					outer = 1.0;
-				}
 				vec2 to_which = behind ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 				path.weight += seen * to_which;
 				path.clear -= seen;
-				path.distance += outermost * middle * to_which;
-				outer_weight += outermost * to_which;
+				path.distance += outermost * inside * middle * to_which;
+				outer_weight += outermost * inside * to_which;
 				outer -= outermost;
 			}
-			if (gap > tap.y - tap.x + width) {
+			if (gap > tap.y - tap.x + coarse) {
 				// Far above: larger cells again.
 				level += 1.0;
 				cell *= 2.0;

@@ -182,10 +182,10 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 	float received = 1.0;
 #if VIEW_ABOVE
 	if (!through) {
-		// A facet turned away from light or view is faded out instead of cut.
-		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * smoothstep(-0.05, 0.10, p.mu_v_facet) * p.lit;
+		// A facet turned away from light is faded out instead of cut. One turned away from the view is not seen: what says so is the crest that a pixel is on.
+		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * p.lit;
 		m_l = max(p.mu_l_facet, 0.03);
-		m_v = max(p.mu_v_facet, 0.03);
+		m_v = max(p.mu_v_facet, 0.1);
 		thickness = p.way * m_v;
 		received = p.received;
 	}

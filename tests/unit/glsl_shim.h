@@ -187,6 +187,8 @@ static vec4 arguments[4], stored[8];
 	X(cloud_layer)                                                                                                                     \
 	X(cloud_field)                                                                                                                     \
 	X(cloud_drift)                                                                                                                     \
+	X(cloud_puffs)                                                                                                                     \
+	X(cloud_puffs_drift)                                                                                                               \
 	X(cloud_detail)                                                                                                                    \
 	X(cloud_threshold)                                                                                                                 \
 	X(extinction)                                                                                                                      \

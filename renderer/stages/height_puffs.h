@@ -1,0 +1,19 @@
+/* Puffs on the cloud tops seen from above, from about a hundred metres down to about ten: what the height field's texels do not resolve.
+ *
+ * A periodic volume of how far the surface bulges at a place (shaders/lib/height_detail.glsl): cells upon cells, rounded outside with
+ * creases between. It is the same for all scenes; those shift it, and time carries it up through the tops, so that puffs well up and go
+ * under.
+ */
+#ifndef STRATUS_RENDERER_STAGES_HEIGHT_PUFFS_H
+#define STRATUS_RENDERER_STAGES_HEIGHT_PUFFS_H
+
+#include "renderer/scene.h"
+#include "renderer/stages/stage.h"
+
+/* Fills in the block's cloud_puffs and cloud_puffs_drift. */
+void height_puffs_fill_block(struct scene_block *block, const struct scene_clouds *clouds);
+
+/* The volume, which stays valid for this frame. NULL when out of memory. */
+const struct texture *height_puffs_get(struct stage_context *context);
+
+#endif

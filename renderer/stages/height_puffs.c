@@ -4,7 +4,9 @@
 #include <stdlib.h>
 
 /* Texels, as in shaders/lib/height_detail.glsl. */
-enum { SIDE = 128, DEPTH = 32, LAYERS = 3 };
+enum { SIDE = 128, DEPTH = 30, LAYERS = 3 };
+/* Of the other picture: rows of a group of planes, the first and the last of which lie beyond the edges; and groups. */
+enum { GROUP_PLANES = 3, GROUP_ROWS = SIDE + 2, GROUPS = DEPTH / GROUP_PLANES };
 
 /* Cells of each layer across the volume and down. No one's number is a multiple of another's, so that their lattices never lie alike. */
 static const int periods[LAYERS][2] = {{10, 3}, {21, 5}, {43, 11}};
@@ -122,17 +124,31 @@ static void fill_texels(const float *sum, float *texels)
 			}
 }
 
-static bool compute(struct texture *puffs)
+/* A group's texels hold its planes and the first one of the next group. */
+static void fill_groups(const float *sum, float *texels)
+{
+	for (int row = 0; row < GROUPS * GROUP_ROWS; row++)
+		for (int x = 0; x < SIDE; x++)
+			for (int i = 0; i <= GROUP_PLANES; i++) {
+				const int z = (row / GROUP_ROWS * GROUP_PLANES + i) % DEPTH, y = (row % GROUP_ROWS + SIDE - 1) % SIDE;
+				texels[4 * (row * SIDE + x) + i] = fminf(fmaxf(0.5f + 0.5f * sum[(z * SIDE + y) * SIDE + x], 0), 1);
+			}
+}
+
+static bool compute(struct height_puffs *puffs)
 {
 	const size_t count = (size_t)SIDE * SIDE * DEPTH;
 	float *sum = calloc(count, sizeof *sum), *distances = calloc(count, sizeof *distances), *texels = calloc(count, 4 * sizeof *texels);
 	const bool ok = sum && distances && texels &&
-			texture_init_3d(puffs, SIDE, SIDE, DEPTH, TEXTURE_RGBA8, TEXTURE_REPEAT | TEXTURE_MIPMAPS);
+			texture_init_3d(&puffs->volume, SIDE, SIDE, DEPTH, TEXTURE_RGBA8, TEXTURE_REPEAT | TEXTURE_MIPMAPS) &&
+			texture_init(&puffs->layers, SIDE, GROUPS * GROUP_ROWS, TEXTURE_RGBA8, TEXTURE_REPEAT_X);
 	if (ok) {
 		sum_cells(sum, distances);
 		fill_texels(sum, texels);
-		texture_upload(puffs, texels);
-		texture_build_mipmaps(puffs);
+		texture_upload(&puffs->volume, texels);
+		texture_build_mipmaps(&puffs->volume);
+		fill_groups(sum, texels);
+		texture_upload(&puffs->layers, texels);
 	}
 	free(texels);
 	free(distances);
@@ -140,24 +156,28 @@ static bool compute(struct texture *puffs)
 	return ok;
 }
 
-static void texture_destroy(void *value)
+static void puffs_destroy(void *value)
 {
-	texture_finish(value);
-	free(value);
+	struct height_puffs *puffs = value;
+	if (!puffs)
+		return;
+	texture_finish(&puffs->layers);
+	texture_finish(&puffs->volume);
+	free(puffs);
 }
 
-const struct texture *height_puffs_get(struct stage_context *context)
+const struct height_puffs *height_puffs_get(struct stage_context *context)
 {
 	const struct cache_key key = cache_key_make("height puffs");
-	struct texture *puffs = cache_find(context->cache, &key);
+	struct height_puffs *puffs = cache_find(context->cache, &key);
 	if (puffs)
 		return puffs;
 	context->reused = false;
 	puffs = calloc(1, sizeof *puffs);
 	if (!puffs || !compute(puffs)) {
-		if (puffs)
-			texture_destroy(puffs);
+		puffs_destroy(puffs);
 		return NULL;
 	}
-	return cache_keep(context->cache, &key, puffs, texture_bytes(puffs), texture_destroy) ? puffs : NULL;
+	const size_t bytes = texture_bytes(&puffs->volume) + texture_bytes(&puffs->layers);
+	return cache_keep(context->cache, &key, puffs, bytes, puffs_destroy) ? puffs : NULL;
 }

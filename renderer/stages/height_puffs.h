@@ -10,10 +10,15 @@
 #include "renderer/scene.h"
 #include "renderer/stages/stage.h"
 
+struct height_puffs {
+	struct texture volume; /* how far the surface bulges, and how that rises along the axes, with means over ever larger cubes */
+	struct texture layers; /* the first alone, four planes side by side in a texel: cheap to look up */
+};
+
 /* Fills in the block's cloud_puffs and cloud_puffs_drift. */
 void height_puffs_fill_block(struct scene_block *block, const struct scene_clouds *clouds);
 
-/* The volume, which stays valid for this frame. NULL when out of memory. */
-const struct texture *height_puffs_get(struct stage_context *context);
+/* Valid for this frame. NULL when out of memory. */
+const struct height_puffs *height_puffs_get(struct stage_context *context);
 
 #endif

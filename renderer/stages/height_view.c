@@ -3,9 +3,10 @@
 #include "renderer/log.h"
 
 #include <stdio.h>
+#include <string.h>
 
-/* Pixels a side of the blocks, as in shaders/lib/height_march.glsl. */
-enum { BLOCK = 8 };
+/* Pixels a side of the blocks, the smaller ones as in shaders/lib/height_march.glsl. */
+enum { BLOCK = 8, SMALL_BLOCK = 2 };
 
 static struct pass *create_pass(const struct pass_compiler *compiler, const char *file, int outputs, enum projection projection, int near)
 {
@@ -16,7 +17,7 @@ static struct pass *create_pass(const struct pass_compiler *compiler, const char
 				 .samplers = {"height_table", "height_light", "smooth_table", "height_start"}};
 	snprintf(defines, sizeof defines, "#define VIEW_PROJECTION %d\n#define HEIGHT_NEAR %d\n", projection, near);
 	if (near)
-		desc.samplers[4] = "height_puffs";
+		memcpy(desc.samplers + 4, (const char *[]){"height_puffs", "height_puff_layers"}, 2 * sizeof(char *));
 	return pass_create(compiler, &desc);
 }
 
@@ -46,17 +47,36 @@ void height_view_finish(struct height_view_stage *stage)
 	*stage = (struct height_view_stage){0};
 }
 
+static int blocks(int pixels, int side)
+{
+	return (pixels + side - 1) / side;
+}
+
 bool height_view_create(const struct scene *scene, struct height_view *seen)
 {
 	const int width = scene->output.width, height = scene->output.height;
 	*seen = (struct height_view){0};
 	const bool ok =
-		texture_init(&seen->start, (width + BLOCK - 1) / BLOCK, (height + BLOCK - 1) / BLOCK, TEXTURE_R32F, TEXTURE_NEAREST) &&
+		texture_init(&seen->first_start, blocks(width, BLOCK), blocks(height, BLOCK), TEXTURE_R32F, TEXTURE_NEAREST) &&
+		texture_init(&seen->start, blocks(width, SMALL_BLOCK), blocks(height, SMALL_BLOCK), TEXTURE_R32F, TEXTURE_NEAREST) &&
 		texture_init(&seen->place, width, height, TEXTURE_RGBA32F, TEXTURE_NEAREST) &&
 		texture_init(&seen->light, width, height, TEXTURE_RGBA32F, TEXTURE_NEAREST);
 	if (!ok)
 		log_error("view: out of memory");
 	return ok;
+}
+
+/* Blocks of two views at once are made anew for the second, when the first has been drawn. */
+static void run_start(const struct pass *pass, const struct camera_view *view, const struct field_maps *field, int side,
+		      const struct texture *begun, struct texture *start)
+{
+	const int first = view->first_row / side, end = blocks(view->first_row + view->height, side);
+	pass_run(pass, &(struct pass_run){.targets = &start,
+					  .width = start->width,
+					  .first_row = first,
+					  .height = end - first,
+					  .samplers = {field->height, NULL, NULL, begun},
+					  .arguments = {{(float)side, begun ? BLOCK : 0}}});
 }
 
 bool height_view_run(struct height_view_stage *stage, const struct scene *scene, const struct camera_view *view,
@@ -65,19 +85,14 @@ bool height_view_run(struct height_view_stage *stage, const struct scene *scene,
 	const int near = scene->clouds.map.map ? 0 : scene->clouds.tile_m > 40000 ? 2 : 1;
 	if (!has_passes(stage, view->projection, near))
 		return false;
-	/* Blocks of two views at once are made anew for the second, when the first has been drawn. */
-	const int first = view->first_row / BLOCK, end = (view->first_row + view->height + BLOCK - 1) / BLOCK;
-	pass_run(stage->start[view->projection], &(struct pass_run){.targets = (struct texture *[]){&seen->start},
-								    .width = seen->start.width,
-								    .first_row = first,
-								    .height = end - first,
-								    .samplers = {field->height}});
+	run_start(stage->start[view->projection], view, field, BLOCK, NULL, &seen->first_start);
+	run_start(stage->start[view->projection], view, field, SMALL_BLOCK, &seen->first_start, &seen->start);
 	pass_run(stage->view[view->projection][near],
 		 &(struct pass_run){.targets = (struct texture *[]){&seen->place, &seen->light},
 				    .width = seen->place.width,
 				    .first_row = view->first_row,
 				    .height = view->height,
-				    .samplers = {field->height, field->light, field->smooth, &seen->start, field->puffs}});
+				    .samplers = {field->height, field->light, field->smooth, &seen->start, &field->puffs->volume, &field->puffs->layers}});
 	return true;
 }
 
@@ -86,4 +101,5 @@ void height_view_release(struct height_view *seen)
 	texture_finish(&seen->light);
 	texture_finish(&seen->place);
 	texture_finish(&seen->start);
+	texture_finish(&seen->first_start);
 }

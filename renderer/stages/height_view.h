@@ -18,7 +18,7 @@ struct height_view_stage {
 /* What shaders/passes/height_view.glsl stores. */
 struct height_view {
 	struct texture place, light;
-	struct texture start; /* of the march, by blocks of pixels */
+	struct texture first_start, start; /* of the march, by blocks of pixels: large ones first */
 };
 
 bool height_view_init(struct height_view_stage *stage, const struct pass_compiler *compiler);

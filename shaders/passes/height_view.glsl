@@ -57,8 +57,8 @@ void pass(ivec2 pixel)
 		STORE(1, vec4(0.0, 0.0, 1.0, 1.0));
 		return;
 	}
-	bool both = path.weight.y > 0.02;
-	height_surface surface = height_surface_at(direction, path.weight.x > 0.0 ? path.distance.x : path.distance.y);
+	bool both = path.weight.y > HEIGHT_HARDLY;
+	height_surface surface = height_surface_at(direction, path.distance.x);
 	if (both) {
 		height_surface second = height_surface_at(direction, path.distance.y);
 		surface.place = mix(surface.place, second.place, path.weight.y / weight);

@@ -7,6 +7,8 @@
 
 /* Pixels a side of the blocks, the smaller ones as in shaders/lib/height_march.glsl. */
 enum { BLOCK = 8, SMALL_BLOCK = 2 };
+/* Held at a time: 128 MiB. */
+enum { PIXELS_MAX = 1 << 22 };
 
 static struct pass *create_pass(const struct pass_compiler *compiler, const char *file, int outputs, enum projection projection, int near)
 {
@@ -54,7 +56,8 @@ static int blocks(int pixels, int side)
 
 bool height_view_create(const struct scene *scene, struct height_view *seen)
 {
-	const int width = scene->output.width, height = scene->output.height;
+	const int width = scene->output.width, rows = PIXELS_MAX / width / BLOCK * BLOCK;
+	const int height = scene->output.height < rows ? scene->output.height : rows;
 	*seen = (struct height_view){0};
 	const bool ok =
 		texture_init(&seen->first_start, blocks(width, BLOCK), blocks(height, BLOCK), TEXTURE_R32F, TEXTURE_NEAREST) &&
@@ -66,32 +69,37 @@ bool height_view_create(const struct scene *scene, struct height_view *seen)
 	return ok;
 }
 
-/* Blocks of two views at once are made anew for the second, when the first has been drawn. */
-static void run_start(const struct pass *pass, const struct camera_view *view, const struct field_maps *field, int side,
+/* Rows [first, end) of what is held. Blocks of two views at once are made anew for the second, when the first has been drawn. */
+static void run_start(const struct pass *pass, const struct field_maps *field, int side, int first_row, int first, int end,
 		      const struct texture *begun, struct texture *start)
 {
-	const int first = view->first_row / side, end = blocks(view->first_row + view->height, side);
+	first = first / side;
+	end = blocks(end, side);
 	pass_run(pass, &(struct pass_run){.targets = &start,
 					  .width = start->width,
 					  .first_row = first,
 					  .height = end - first,
 					  .samplers = {field->height, NULL, NULL, begun},
-					  .arguments = {{(float)side, begun ? BLOCK : 0}}});
+					  .arguments = {{(float)side, begun ? BLOCK : 0, (float)first_row}}});
 }
 
 bool height_view_run(struct height_view_stage *stage, const struct scene *scene, const struct camera_view *view,
-		     const struct field_maps *field, struct height_view *seen)
+		     const struct field_maps *field, int first, int end, struct height_view *seen)
 {
 	const int near = scene->clouds.map.map ? 0 : scene->clouds.tile_m > 40000 ? 2 : 1;
 	if (!has_passes(stage, view->projection, near))
 		return false;
-	run_start(stage->start[view->projection], view, field, BLOCK, NULL, &seen->first_start);
-	run_start(stage->start[view->projection], view, field, SMALL_BLOCK, &seen->first_start, &seen->start);
+	const struct pass *start = stage->start[view->projection];
+	first -= seen->first_row;
+	end -= seen->first_row;
+	run_start(start, field, BLOCK, seen->first_row, first, end, NULL, &seen->first_start);
+	run_start(start, field, SMALL_BLOCK, seen->first_row, first, end, &seen->first_start, &seen->start);
 	pass_run(stage->view[view->projection][near],
 		 &(struct pass_run){.targets = (struct texture *[]){&seen->place, &seen->light},
 				    .width = seen->place.width,
-				    .first_row = view->first_row,
-				    .height = view->height,
+				    .first_row = first,
+				    .height = end - first,
+				    .arguments = {{0, 0, (float)seen->first_row}},
 				    .samplers = {field->height, field->light, field->smooth, &seen->start, &field->puffs->volume, &field->puffs->layers}});
 	return true;
 }

@@ -1,5 +1,5 @@
 // Distance, m, up to which no ray of a block of pixels meets the height field. arguments[0].x: pixels a side; .y: those of the larger blocks that have been begun
-// before, or 0.
+// before, or 0; .z: row of the picture at which the first ones begin.
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/height_march.glsl"
 
@@ -13,7 +13,7 @@ const float HEIGHT_BLOCK_WIDEST = 0.1;
 void pass(ivec2 pixel)
 {
 	float side = arguments[0].x;
-	vec2 corner = vec2(pixel) * side;
+	vec2 corner = vec2(pixel) * side + vec2(0.0, arguments[0].z);
 	vec3 direction = camera_ray(corner + 0.5 * side);
 	float radius = 0.0;
 	for (int i = 0; i < 4; i++) {

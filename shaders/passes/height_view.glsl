@@ -1,5 +1,5 @@
 // What each pixel sees of the height field, which lies below the camera. 0: x mean distance, m; y way through cloud, m; z thickness there, m; w the thickness
-// evened out. 1: x, y slopes to the east and to the north; z share of the beam that comes there; w what often scattered light has received.
+// evened out. arguments[0].z: row of the picture that is the first here. 1: x, y slopes to the east and to the north; z share of the beam that comes there; w what often scattered light has received.
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/height_march.glsl"
 #include "shaders/lib/height_sun.glsl"
@@ -45,7 +45,7 @@ height_surface height_surface_at(vec3 direction, float t)
 
 void pass(ivec2 pixel)
 {
-	vec3 direction = camera_ray(vec2(pixel) + 0.5);
+	vec3 direction = camera_ray(vec2(pixel) + vec2(0.5, arguments[0].z + 0.5));
 	vec2 range = height_range(direction);
 	height_path path = height_path_clear();
 	range.x = max(range.x, texelFetch(height_start, pixel / HEIGHT_BLOCK, 0).x);

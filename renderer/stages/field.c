@@ -7,13 +7,15 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { PASS_HISTOGRAM, PASS_HEIGHT, PASS_LEVELS, PASS_SMOOTH };
+enum { PASS_HISTOGRAM, PASS_HEIGHT, PASS_LEVELS, PASS_SMOOTH, PASS_OPEN, PASS_ROUND };
 
 static const struct pass_desc pass_descs[FIELD_PASS_COUNT] = {
 	[PASS_HISTOGRAM] = {.file = "shaders/passes/field_histogram.glsl", .outputs = 0, .samplers = {"field_coarse", "field_detail"}},
 	[PASS_HEIGHT] = {.file = "shaders/passes/height_base.glsl", .outputs = 1, .samplers = {"field_coarse", "field_detail"}},
 	[PASS_LEVELS] = {.file = "shaders/passes/height_levels.glsl", .outputs = 1, .samplers = {"height_below"}},
 	[PASS_SMOOTH] = {.file = "shaders/passes/height_smooth.glsl", .outputs = 1, .samplers = {"thickness"}},
+	[PASS_OPEN] = {.file = "shaders/passes/height_open.glsl", .outputs = 1, .samplers = {"heights"}},
+	[PASS_ROUND] = {.file = "shaders/passes/height_round.glsl", .outputs = 1, .samplers = {"heights", "rounded"}},
 };
 
 /* HEIGHT_SIDE and SMOOTH_SIDE as in shaders/lib/height.glsl. */
@@ -245,10 +247,52 @@ static void build_levels(const struct field_stage *stage, const struct texture *
 	}
 }
 
-static struct texture *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse)
+/* Radius of curvature of the sharpest tops, over the thickness: the cells of a field are as wide as they are, however thick it is, and
+ * stretched over a thick one they would be spires. */
+static const double sharpest_top = 0.12;
+/* Thinner layers have no tops to speak of, m. */
+static const double flat_thickness = 250;
+
+static bool round_tops(const struct field_stage *stage, double thickness, double tile, struct texture *heights)
+{
+	const double radius = sharpest_top * thickness;
+	struct texture lowest = {0}, highest = {0}, rounded = {0};
+	int side = HEIGHT_SIDE / 2;
+	while (side > 32 && tile / side < 0.6 * radius)
+		side /= 2;
+	const double texel = tile / side, fall = texel * texel / (2 * radius);
+	const bool ok = texture_init(&lowest, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
+			texture_init(&highest, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
+			texture_init(&rounded, HEIGHT_SIDE, HEIGHT_SIDE, TEXTURE_R32F, TEXTURE_REPEAT);
+	if (ok) {
+		const float level = log2f((float)HEIGHT_SIDE / (float)side);
+		pass_run(stage->passes[PASS_OPEN], &(struct pass_run){.targets = (struct texture *[]){&lowest},
+								      .samplers = {heights},
+								      .arguments = {{(float)side, (float)fall, 1, level}}});
+		pass_run(stage->passes[PASS_OPEN], &(struct pass_run){.targets = (struct texture *[]){&highest},
+								      .samplers = {&lowest},
+								      .arguments = {{(float)side, (float)fall, -1, 0}}});
+		pass_run(stage->passes[PASS_ROUND],
+			 &(struct pass_run){.targets = (struct texture *[]){&rounded},
+					    .samplers = {heights, &highest},
+					    .arguments = {{HEIGHT_SIDE, (float)side, (float)(0.08 * thickness)}}});
+		texture_finish(heights);
+		*heights = rounded;
+		rounded = (struct texture){0};
+	}
+	texture_finish(&rounded);
+	texture_finish(&highest);
+	texture_finish(&lowest);
+	return ok;
+}
+
+static struct texture *height_field_compute(const struct field_stage *stage, const struct scene_clouds *clouds,
+					    const struct coarse_field *coarse)
 {
 	struct texture heights = {0}, *field = calloc(1, sizeof *field);
+	const bool tops = !clouds->map.map && clouds->thickness_m > flat_thickness;
 	if (!field || !height_compute(stage, coarse, HEIGHT_SIDE, &heights) ||
+	    (tops && !round_tops(stage, clouds->thickness_m, clouds->tile_m, &heights)) ||
 	    !texture_init(field, HEIGHT_SIDE, HEIGHT_SIDE, TEXTURE_RG16, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
 		texture_finish(&heights);
 		texture_destroy(field);
@@ -275,7 +319,7 @@ static const struct texture *height_field_get(const struct field_stage *stage, s
 	if (field)
 		return field;
 	context->reused = false;
-	field = height_field_compute(stage, coarse);
+	field = height_field_compute(stage, &scene->clouds, coarse);
 	if (!field || !cache_keep(context->cache, &key, field, texture_bytes(field), texture_destroy))
 		return NULL;
 	return field;

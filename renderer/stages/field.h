@@ -12,7 +12,7 @@
 #include "renderer/stages/height_puffs.h"
 #include "renderer/stages/packed.h"
 
-enum { FIELD_PASS_COUNT = 4 };
+enum { FIELD_PASS_COUNT = 6 };
 
 struct field_stage {
 	struct pass *passes[FIELD_PASS_COUNT];

@@ -11,9 +11,9 @@ enum { GROUP_PLANES = 3, GROUP_ROWS = SIDE + 2, GROUPS = DEPTH / GROUP_PLANES };
 /* Cells of each layer across the volume and down. No one's number is a multiple of another's, so that their lattices never lie alike. */
 static const int periods[LAYERS][2] = {{10, 3}, {21, 5}, {43, 11}};
 
-/* Amplitude goes as size to the power of 2/3: outlines of clouds have the dimension 4/3 (Lovejoy 1982, Science 216, 185), those of surfaces
- * whose height varies so over distance. */
-static const double roughness = 2. / 3;
+/* Amplitude goes as size to a power. Outlines of clouds have the dimension 4/3 (Lovejoy 1982, Science 216, 185), which a surface has whose
+ * height varies over distance to the power of 2/3; tops, which are seen down to less than a mean free path, are smoother there. */
+static const double roughness = 0.8;
 /* A cell's top falls off so with the square of the distance to its middle, in cells. */
 static const double fall = 1.5;
 
@@ -32,6 +32,8 @@ static const struct {
 
 /* Tile for which the lengths are; on larger ones puffs begin at what the height field's larger texels leave out. */
 static const double usual_tile = 20000;
+/* Thicker ones tower higher, with larger puffs. */
+static const double usual_thickness = 700;
 
 static double share_of(uint32_t x)
 {
@@ -40,13 +42,27 @@ static double share_of(uint32_t x)
 	return (double)((x ^ (x >> 16)) >> 8) / (1 << 24);
 }
 
+/* By how much the largest puffs are larger than usual. */
+static double enlargement(const struct scene_clouds *clouds)
+{
+	return fmax(1, fmax(clouds->tile_m / usual_tile, clouds->thickness_m / usual_thickness));
+}
+
+int height_puffs_octaves(const struct scene_clouds *clouds)
+{
+	/* Nothing is added to what a map says. */
+	return clouds->map.map ? 0 : enlargement(clouds) > 2 ? 2 : 1;
+}
+
 void height_puffs_fill_block(struct scene_block *block, const struct scene_clouds *clouds)
 {
-	const double larger = fmax(1, clouds->tile_m / usual_tile), length = kinds[clouds->type].length * larger * periods[0][0];
+	const int octaves = height_puffs_octaves(clouds);
+	const double larger = enlargement(clouds), length = kinds[clouds->type].length * larger * periods[0][0];
 	/* As many times as fit: the volume repeats with the tile of the field. */
 	const double tile = length > 0 ? clouds->tile_m / fmax(1, round(clouds->tile_m / length)) : 1, depth = tile * DEPTH / SIDE;
-	/* Nothing is added to what a map says. */
-	const double height = clouds->map.map ? 0 : fmin(kinds[clouds->type].height * pow(larger, roughness), 0.4 * clouds->thickness_m);
+	const double height =
+		octaves > 0 ? fmin(kinds[clouds->type].height * pow(larger, roughness), (octaves > 1 ? 0.6 : 0.4) * clouds->thickness_m)
+			    : 0;
 	const double risen = kinds[clouds->type].speed * clouds->time_s / depth;
 	block->cloud_puffs[0] = (float)height;
 	block->cloud_puffs[1] = (float)tile;
@@ -120,7 +136,8 @@ static void fill_texels(const float *sum, float *texels)
 				texel[0] = fminf(fmaxf(0.5f + 0.5f * sum[at], 0), 1);
 				texel[1] = rise(sum, row + (x + 1) % SIDE, row + (x + SIDE - 1) % SIDE);
 				texel[2] = rise(sum, column + (y + 1) % SIDE * SIDE, column + (y + SIDE - 1) % SIDE * SIDE);
-				texel[3] = rise(sum, (z + 1) % DEPTH * plane + y * SIDE + x, (z + DEPTH - 1) % DEPTH * plane + y * SIDE + x);
+				texel[3] =
+					rise(sum, (z + 1) % DEPTH * plane + y * SIDE + x, (z + DEPTH - 1) % DEPTH * plane + y * SIDE + x);
 			}
 }
 

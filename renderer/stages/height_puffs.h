@@ -15,6 +15,11 @@ struct height_puffs {
 	struct texture layers; /* the first alone, four planes side by side in a texel: cheap to look up */
 };
 
+/* 0: the field has no puffs; 1: it has; 2: these are so large that smaller ones stand on them. As HEIGHT_NEAR in
+ * shaders/lib/height_detail.glsl.
+ */
+int height_puffs_octaves(const struct scene_clouds *clouds);
+
 /* Fills in the block's cloud_puffs and cloud_puffs_drift. */
 void height_puffs_fill_block(struct scene_block *block, const struct scene_clouds *clouds);
 

@@ -86,7 +86,7 @@ static void run_start(const struct pass *pass, const struct field_maps *field, i
 bool height_view_run(struct height_view_stage *stage, const struct scene *scene, const struct camera_view *view,
 		     const struct field_maps *field, int first, int end, struct height_view *seen)
 {
-	const int near = scene->clouds.map.map ? 0 : scene->clouds.tile_m > 40000 ? 2 : 1;
+	const int near = height_puffs_octaves(&scene->clouds);
 	if (!has_passes(stage, view->projection, near))
 		return false;
 	const struct pass *start = stage->start[view->projection];
@@ -100,7 +100,8 @@ bool height_view_run(struct height_view_stage *stage, const struct scene *scene,
 				    .first_row = first,
 				    .height = end - first,
 				    .arguments = {{0, 0, (float)seen->first_row}},
-				    .samplers = {field->height, field->light, field->smooth, &seen->start, &field->puffs->volume, &field->puffs->layers}});
+				    .samplers = {field->height, field->light, field->smooth, &seen->start, &field->puffs->volume,
+						 &field->puffs->layers}});
 	return true;
 }
 

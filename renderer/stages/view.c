@@ -294,8 +294,8 @@ static bool run_up(struct view_stage *stage, const struct scene_block *block, co
 	return true;
 }
 
-/* Runs over rows [first, last) of one kind after the other, each with the program made for it. `up`: how those that look up at the layer are run, or NULL
- * for the ordinary program. */
+/* Runs over rows [first, last) of one kind after the other, each with the program made for it. `up`: how those that look up at the layer
+ * are run, or NULL for the ordinary program. */
 static bool run_regions(struct view_stage *stage, const struct stage_context *context, const struct camera_view *view, int first, int last,
 			struct view_variant variant, struct pass_run *run, struct pass_run *up)
 {

@@ -18,17 +18,21 @@ const float HEIGHT_PUFF_GROUP_ROWS = 130.0;
 // Steepest rise, full ranges a texel.
 const float HEIGHT_PUFF_STEEPEST = 0.25;
 // A puff bulges at most so far beyond its mean, as a share of the full range.
+#if HEIGHT_NEAR == 2
+const float HEIGHT_PUFF_TOP = 0.7;
+#else
 const float HEIGHT_PUFF_TOP = 0.5;
+#endif
 // Light sees nothing in droplets that is finer, m.
-const float HEIGHT_PUFF_FINEST = 13.0;
+const float HEIGHT_PUFF_FINEST = 16.0;
 // Where the field's texels are large, smaller ones stand on them, so much finer and lower.
 const float HEIGHT_PUFF_STEP = 8.0;
-const float HEIGHT_PUFF_LOWER = 0.25;
+const float HEIGHT_PUFF_LOWER = 0.3;
 
 // How far puffs bulge from crease to top, m, on cloud of some thickness.
 float height_puff_scale(float thickness)
 {
-	return cloud_puffs.x * thickness / (thickness + cloud_puffs.x + 1e-3);
+	return cloud_puffs.x * thickness / (thickness + 0.6 * cloud_puffs.x + 1e-3);
 }
 
 // Where in the volume a place in the drifting field and a height over the base are.

@@ -290,7 +290,9 @@ static struct texture *height_field_compute(const struct field_stage *stage, con
 					    const struct coarse_field *coarse)
 {
 	struct texture heights = {0}, *field = calloc(1, sizeof *field);
-	const bool tops = !clouds->map.map && clouds->thickness_m > flat_thickness;
+	/* Where texels are larger than spires, there are none. */
+	const bool tops = !clouds->map.map && clouds->thickness_m > flat_thickness &&
+			  sharpest_top * clouds->thickness_m > clouds->tile_m / (HEIGHT_SIDE / 2);
 	if (!field || !height_compute(stage, coarse, HEIGHT_SIDE, &heights) ||
 	    (tops && !round_tops(stage, clouds->thickness_m, clouds->tile_m, &heights)) ||
 	    !texture_init(field, HEIGHT_SIDE, HEIGHT_SIDE, TEXTURE_RG16, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {

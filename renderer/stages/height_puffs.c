@@ -51,7 +51,7 @@ static double enlargement(const struct scene_clouds *clouds)
 int height_puffs_octaves(const struct scene_clouds *clouds)
 {
 	/* Nothing is added to what a map says. */
-	return clouds->map.map ? 0 : enlargement(clouds) > 2 ? 2 : 1;
+	return clouds->map.map ? 0 : enlargement(clouds) > 4 ? 2 : 1;
 }
 
 void height_puffs_fill_block(struct scene_block *block, const struct scene_clouds *clouds)

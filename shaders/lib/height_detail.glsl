@@ -19,7 +19,7 @@ const float HEIGHT_PUFF_GROUP_ROWS = 130.0;
 const float HEIGHT_PUFF_STEEPEST = 0.25;
 // A puff bulges at most so far beyond its mean, as a share of the full range.
 #if HEIGHT_NEAR == 2
-const float HEIGHT_PUFF_TOP = 0.7;
+const float HEIGHT_PUFF_TOP = 0.6;
 #else
 const float HEIGHT_PUFF_TOP = 0.5;
 #endif
@@ -27,7 +27,7 @@ const float HEIGHT_PUFF_TOP = 0.5;
 const float HEIGHT_PUFF_FINEST = 16.0;
 // Where the field's texels are large, smaller ones stand on them, so much finer and lower.
 const float HEIGHT_PUFF_STEP = 8.0;
-const float HEIGHT_PUFF_LOWER = 0.3;
+const float HEIGHT_PUFF_LOWER = 0.18;
 
 // How far puffs bulge from crease to top, m, on cloud of some thickness.
 float height_puff_scale(float thickness)

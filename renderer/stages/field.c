@@ -18,8 +18,8 @@ static const struct pass_desc pass_descs[FIELD_PASS_COUNT] = {
 	[PASS_ROUND] = {.file = "shaders/passes/height_round.glsl", .outputs = 1, .samplers = {"heights", "rounded"}},
 };
 
-/* HEIGHT_SIDE and SMOOTH_SIDE as in shaders/lib/height.glsl. */
-enum { HEIGHT_SIDE = 1024, SMOOTH_SIDE = 256, HISTOGRAM_SIDE = 256, HISTOGRAM_BINS = 4096 };
+/* SMOOTH_SIDE as in shaders/lib/height.glsl. */
+enum { SMOOTH_SIDE = 256, HISTOGRAM_SIDE = 256, HISTOGRAM_BINS = 4096 };
 
 /* Densities are sums of cells and noise with weights below 1: nothing lies outside. */
 static const double density_lowest = -4, density_highest = 6;
@@ -237,7 +237,7 @@ static void build_levels(const struct field_stage *stage, const struct texture *
 {
 	for (int level = 0; level < field->levels; level++) {
 		struct texture below = level == 0 ? *heights : texture_level(field, level - 1);
-		const int size = level == 0 ? HEIGHT_SIDE : HEIGHT_SIDE >> (level - 1);
+		const int size = level == 0 ? heights->width : heights->width >> (level - 1);
 		pass_run(stage->passes[PASS_LEVELS], &(struct pass_run){.targets = (struct texture *[]){field},
 									.level = level,
 									.samplers = {&below},
@@ -257,15 +257,16 @@ static bool round_tops(const struct field_stage *stage, double thickness, double
 {
 	const double radius = sharpest_top * thickness;
 	struct texture lowest = {0}, highest = {0}, rounded = {0};
-	int side = HEIGHT_SIDE / 2;
+	const int whole = heights->width;
+	int side = whole / 2;
 	while (side > 32 && tile / side < 0.6 * radius)
 		side /= 2;
 	const double texel = tile / side, fall = texel * texel / (2 * radius);
 	const bool ok = texture_init(&lowest, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
 			texture_init(&highest, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
-			texture_init(&rounded, HEIGHT_SIDE, HEIGHT_SIDE, TEXTURE_R32F, TEXTURE_REPEAT);
+			texture_init(&rounded, whole, whole, TEXTURE_R32F, TEXTURE_REPEAT);
 	if (ok) {
-		const float level = log2f((float)HEIGHT_SIDE / (float)side);
+		const float level = log2f((float)whole / (float)side);
 		pass_run(stage->passes[PASS_OPEN], &(struct pass_run){.targets = (struct texture *[]){&lowest},
 								      .samplers = {heights},
 								      .arguments = {{(float)side, (float)fall, 1, level}}});
@@ -275,7 +276,7 @@ static bool round_tops(const struct field_stage *stage, double thickness, double
 		pass_run(stage->passes[PASS_ROUND],
 			 &(struct pass_run){.targets = (struct texture *[]){&rounded},
 					    .samplers = {heights, &highest},
-					    .arguments = {{HEIGHT_SIDE, (float)side, (float)(0.08 * thickness)}}});
+					    .arguments = {{(float)whole, (float)side, (float)(0.08 * thickness)}}});
 		texture_finish(heights);
 		*heights = rounded;
 		rounded = (struct texture){0};
@@ -289,13 +290,14 @@ static bool round_tops(const struct field_stage *stage, double thickness, double
 static struct texture *height_field_compute(const struct field_stage *stage, const struct scene_clouds *clouds,
 					    const struct coarse_field *coarse)
 {
+	const int side = height_puffs_field_side(clouds);
 	struct texture heights = {0}, *field = calloc(1, sizeof *field);
 	/* Where texels are larger than spires, there are none. */
-	const bool tops = !clouds->map.map && clouds->thickness_m > flat_thickness &&
-			  sharpest_top * clouds->thickness_m > clouds->tile_m / (HEIGHT_SIDE / 2);
-	if (!field || !height_compute(stage, coarse, HEIGHT_SIDE, &heights) ||
+	const bool tops =
+		!clouds->map.map && clouds->thickness_m > flat_thickness && sharpest_top * clouds->thickness_m > 2 * clouds->tile_m / side;
+	if (!field || !height_compute(stage, coarse, side, &heights) ||
 	    (tops && !round_tops(stage, clouds->thickness_m, clouds->tile_m, &heights)) ||
-	    !texture_init(field, HEIGHT_SIDE, HEIGHT_SIDE, TEXTURE_RG16, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
+	    !texture_init(field, side, side, TEXTURE_RG16, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
 		texture_finish(&heights);
 		texture_destroy(field);
 		return NULL;

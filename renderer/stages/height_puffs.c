@@ -42,10 +42,15 @@ static double share_of(uint32_t x)
 	return (double)((x ^ (x >> 16)) >> 8) / (1 << 24);
 }
 
+int height_puffs_field_side(const struct scene_clouds *clouds)
+{
+	return clouds->tile_m > 2 * usual_tile ? 2048 : 1024;
+}
+
 /* By how much the largest puffs are larger than usual. */
 static double enlargement(const struct scene_clouds *clouds)
 {
-	return fmax(1, fmax(clouds->tile_m / usual_tile, clouds->thickness_m / usual_thickness));
+	return fmax(1, fmax(clouds->tile_m / usual_tile * 1024 / height_puffs_field_side(clouds), clouds->thickness_m / usual_thickness));
 }
 
 int height_puffs_octaves(const struct scene_clouds *clouds)
@@ -66,7 +71,7 @@ void height_puffs_fill_block(struct scene_block *block, const struct scene_cloud
 	const double risen = kinds[clouds->type].speed * clouds->time_s / depth;
 	block->cloud_puffs[0] = (float)height;
 	block->cloud_puffs[1] = (float)tile;
-	block->cloud_puffs[2] = 0;
+	block->cloud_puffs[2] = (float)height_puffs_field_side(clouds);
 	block->cloud_puffs[3] = 0;
 	block->cloud_puffs_drift[0] = (float)share_of(3 * clouds->seed);
 	block->cloud_puffs_drift[1] = (float)share_of(3 * clouds->seed + 1);

@@ -15,6 +15,9 @@ struct height_puffs {
 	struct texture layers; /* the first alone, four planes side by side in a texel: cheap to look up */
 };
 
+/* Texels a side of the height field that they stand on. */
+int height_puffs_field_side(const struct scene_clouds *clouds);
+
 /* 0: the field has no puffs; 1: it has; 2: these are so large that smaller ones stand on them. As HEIGHT_NEAR in
  * shaders/lib/height_detail.glsl.
  */

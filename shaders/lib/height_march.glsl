@@ -50,7 +50,7 @@ vec2 height_tap(vec2 uv, float level)
 // meets one at all. begun: what is known to be empty.
 float height_block_start(vec3 direction, vec2 range, float radius, float begun)
 {
-	float texel = cloud_layer.z / HEIGHT_SIZE;
+	float texel = cloud_layer.z / cloud_puffs.z;
 	vec2 origin = (vec2(camera_position) - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
 	vec2 rate = vec2(direction) / cloud_layer.z;
 	float speed = max(length(vec2(direction)), 1e-3);
@@ -132,7 +132,7 @@ height_ray height_ray_of(vec3 direction, float pixel_angle)
 // Distance from t on, or from end on, at which the surface may be within a texel or a pixel.
 float height_approach(height_ray ray, float t, float end)
 {
-	float texel = cloud_layer.z / HEIGHT_SIZE;
+	float texel = cloud_layer.z / cloud_puffs.z;
 	float level = 2.0;
 	for (int i = 0; i < HEIGHT_HOPS; i++) {
 		float cell = texel * exp2(level);
@@ -157,7 +157,7 @@ float height_approach(height_ray ray, float t, float end)
 // range: where to look, m. pixel_angle: angle between pixels.
 height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 {
-	float texel = cloud_layer.z / HEIGHT_SIZE;
+	float texel = cloud_layer.z / cloud_puffs.z;
 	height_ray ray = height_ray_of(direction, pixel_angle);
 	// Steps short enough that a steep ray does not pass the layer in one.
 	float longest = cloud_layer.y / max(-direction.z, 0.01) * (1.0 / 16.0);

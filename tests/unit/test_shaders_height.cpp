@@ -124,6 +124,7 @@ static void make_field(const std::function<double(double, double)> &height)
 			heights->levels[0].texels.push_back(vec4((float)height((x + 0.5) * tile / SIDE, (y + 0.5) * tile / SIDE), 0, 0, 1));
 	glsl::cloud_layer = vec4(base, thickness, tile, 1);
 	glsl::cloud_drift = vec4(0);
+	glsl::cloud_puffs = vec4(0, 1000, SIDE, 0);
 	glsl::extinction_scaled = vec4((float)kappa);
 	auto field = std::make_shared<glsl::image>();
 	field->repeat_x = field->repeat_y = true;

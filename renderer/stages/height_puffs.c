@@ -24,7 +24,7 @@ static const float steepest = 0.25f;
 static const struct {
 	double length, height, speed;
 } kinds[CLOUD_TYPE_COUNT] = {
-	[CLOUD_STRATUS] = {110, 18, 0.2},
+	[CLOUD_STRATUS] = {110, 10, 0.2},
 	[CLOUD_STRATOCUMULUS] = {100, 75, 0.7},
 	[CLOUD_ALTOCUMULUS] = {60, 30, 0.4},
 	[CLOUD_CIRROCUMULUS] = {40, 16, 0.3},

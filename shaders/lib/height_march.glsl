@@ -12,7 +12,7 @@ const int HEIGHT_HOPS = 64;
 const int HEIGHT_STEPS = 48;
 const int HEIGHT_APPROACHES = 12;
 // What is left of the light behind is no longer looked at.
-const float HEIGHT_OPAQUE = 0.03;
+const float HEIGHT_OPAQUE = 0.04;
 // Share of a pixel that is not worth a place of its own.
 const float HEIGHT_HARDLY = 0.02;
 // Pixels a side of the blocks that begin together at last.
@@ -170,8 +170,10 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 	float outer = 1.0;
 	vec2 outer_weight = vec2(0.0);
 	for (int approach = 0; approach < HEIGHT_APPROACHES; approach++) {
+		if (path.clear < HEIGHT_OPAQUE)
+			break;
 		t = height_approach(ray, t, range.y);
-		if (t > range.y || path.clear < HEIGHT_OPAQUE)
+		if (t > range.y)
 			break;
 		float before = -1.0; // where the last sample was; none
 		float gap_before = 0.0;
@@ -194,7 +196,7 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			room -= HEIGHT_PUFF_TOP * scale;
 			gap -= scale * height_bulge((ray.origin + ray.rate * t) * cloud_layer.z, z, width);
 #endif
-			float stride = gap > 0.0 ? 0.7 * finest + 0.5 * gap : max(0.7 * finest, dense) - 0.8 * gap;
+			float stride = gap > 0.0 ? 0.7 * finest + 0.55 * gap : max(0.7 * finest, dense) - 0.8 * gap;
 			if (before >= 0.0) {
 				float length_m = t - before;
 				float inside = height_inside(gap_before, gap, soft);

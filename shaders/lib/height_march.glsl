@@ -161,7 +161,7 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 	height_ray ray = height_ray_of(direction, pixel_angle);
 	// Steps short enough that a steep ray does not pass the layer in one.
 	float longest = cloud_layer.y / max(-direction.z, 0.01) * (1.0 / 16.0);
-	// Inside, the way between two scatterings needs no more than a few steps.
+	// Deep inside, the way between two scatterings needs no more than a few steps.
 	float dense = 0.8 / extinction_scaled.y;
 	height_path path = height_path_clear();
 	float t = range.x;
@@ -196,7 +196,7 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			room -= HEIGHT_PUFF_TOP * scale;
 			gap -= scale * height_bulge((ray.origin + ray.rate * t) * cloud_layer.z, z, width);
 #endif
-			float stride = gap > 0.0 ? 0.7 * finest + 0.55 * gap : max(0.7 * finest, dense) - 0.8 * gap;
+			float stride = gap > 0.0 ? 0.7 * finest + 0.55 * gap : max(0.7 * finest, dense * min(-0.05 * gap, 1.0)) - 0.8 * gap;
 			if (before >= 0.0) {
 				float length_m = t - before;
 				float inside = height_inside(gap_before, gap, soft);

@@ -27,7 +27,11 @@ struct scene_block {
 	float cloud_layer[4];        /* base, m; thickness (maximum of H), m; tile, m; 1 when there are clouds */
 	float cloud_field[4];        /* share of the range where edges are thin; shift of detail, m a density; its tiles; billows, m */
 	float cloud_drift[4];        /* drift so far, m, modulo the tile: east, north; -; - */
-	float cloud_detail[4];       /* tile of the detail, m; its drift, m: east, north; weight */
+	float cloud_puffs[4]; /* on tops seen from above: how far they bulge from crease to top, m; their tile, m; texels a side of the
+			       * height field; -
+			       */
+	float cloud_puffs_drift[4]; /* where in their volume the tile's corner is: east, north, up, volumes; - */
+	float cloud_detail[4];      /* tile of the detail, m; its drift, m: east, north; weight */
 	float cloud_threshold[4]; /* field value where H begins; 1/(range above it); roundness of H, 0: a map of H; resolution of the field
 				   */
 	float extinction[4];      /* kappa, 1/m; - */

@@ -42,16 +42,18 @@ bool texture_init(struct texture *texture, int width, int height, enum texture_f
 	return true;
 }
 
-bool texture_init_3d(struct texture *texture, int width, int height, int depth, enum texture_format format)
+bool texture_init_3d(struct texture *texture, int width, int height, int depth, enum texture_format format, int flags)
 {
 	static const GLenum wraps[] = {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R};
-	*texture = (struct texture){.width = width, .height = height, .depth = depth, .levels = 1, .format = format};
+	const bool mipmaps = flags & TEXTURE_MIPMAPS;
+	const int levels = mipmaps ? level_count(width > depth ? width : depth, height) : 1;
+	*texture = (struct texture){.width = width, .height = height, .depth = depth, .levels = levels, .format = format};
 	glCreateTextures(GL_TEXTURE_3D, 1, &texture->id);
-	glTextureStorage3D(texture->id, 1, formats[format].internal, width, height, depth);
+	glTextureStorage3D(texture->id, levels, formats[format].internal, width, height, depth);
 	glTextureParameteri(texture->id, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-	glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+	glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER, mipmaps ? GL_LINEAR_MIPMAP_LINEAR : GL_LINEAR);
 	for (int i = 0; i < 3; i++)
-		glTextureParameteri(texture->id, wraps[i], GL_CLAMP_TO_EDGE);
+		glTextureParameteri(texture->id, wraps[i], flags & TEXTURE_REPEAT ? GL_REPEAT : GL_CLAMP_TO_EDGE);
 	if (gl_failed("texture storage")) {
 		texture_finish(texture);
 		return false;

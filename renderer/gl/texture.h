@@ -15,7 +15,7 @@ struct texture {
 };
 
 enum texture_flags {
-	TEXTURE_REPEAT = 1,   /* both directions; else clamped to the edge */
+	TEXTURE_REPEAT = 1,   /* all directions; else clamped to the edge */
 	TEXTURE_REPEAT_X = 2, /* columns repeat, rows are clamped */
 	TEXTURE_NEAREST = 4,  /* no filtering; else linear, and linear between levels */
 	TEXTURE_MIPMAPS = 8,  /* all levels down to 1 x 1 */
@@ -24,8 +24,8 @@ enum texture_flags {
 /* Allocates; contents undefined. false (and a log line) when OpenGL refuses. */
 bool texture_init(struct texture *texture, int width, int height, enum texture_format format, int flags);
 
-/* The same with a third dimension, of one level, filtered linearly along all three and clamped to the edges. */
-bool texture_init_3d(struct texture *texture, int width, int height, int depth, enum texture_format format);
+/* The same with a third dimension, filtered linearly along all three. flags: TEXTURE_REPEAT (all directions), TEXTURE_MIPMAPS. */
+bool texture_init_3d(struct texture *texture, int width, int height, int depth, enum texture_format format, int flags);
 
 /* Replaces level 0: rows of width x components floats, in three dimensions plane after plane. TEXTURE_RGBA8/16 take 0..1. */
 void texture_upload(const struct texture *texture, const float *values);

@@ -7,17 +7,19 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { PASS_HISTOGRAM, PASS_HEIGHT, PASS_LEVELS, PASS_SMOOTH };
+enum { PASS_HISTOGRAM, PASS_HEIGHT, PASS_LEVELS, PASS_SMOOTH, PASS_OPEN, PASS_ROUND };
 
 static const struct pass_desc pass_descs[FIELD_PASS_COUNT] = {
 	[PASS_HISTOGRAM] = {.file = "shaders/passes/field_histogram.glsl", .outputs = 0, .samplers = {"field_coarse", "field_detail"}},
 	[PASS_HEIGHT] = {.file = "shaders/passes/height_base.glsl", .outputs = 1, .samplers = {"field_coarse", "field_detail"}},
 	[PASS_LEVELS] = {.file = "shaders/passes/height_levels.glsl", .outputs = 1, .samplers = {"height_below"}},
 	[PASS_SMOOTH] = {.file = "shaders/passes/height_smooth.glsl", .outputs = 1, .samplers = {"thickness"}},
+	[PASS_OPEN] = {.file = "shaders/passes/height_open.glsl", .outputs = 1, .samplers = {"heights"}},
+	[PASS_ROUND] = {.file = "shaders/passes/height_round.glsl", .outputs = 1, .samplers = {"heights", "rounded"}},
 };
 
-/* HEIGHT_SIDE and SMOOTH_SIDE as in shaders/lib/height.glsl. */
-enum { HEIGHT_SIDE = 1024, SMOOTH_SIDE = 256, HISTOGRAM_SIDE = 256, HISTOGRAM_BINS = 4096 };
+/* SMOOTH_SIDE as in shaders/lib/height.glsl. */
+enum { SMOOTH_SIDE = 256, HISTOGRAM_SIDE = 256, HISTOGRAM_BINS = 4096 };
 
 /* Densities are sums of cells and noise with weights below 1: nothing lies outside. */
 static const double density_lowest = -4, density_highest = 6;
@@ -81,6 +83,7 @@ static void fill_block(struct scene_block *block, const struct scene_clouds *clo
 	block->cloud_layer[3] = clouds->type != CLOUD_NONE && clouds->thickness_m > 0 ? 1.0f : 0.0f;
 	block->cloud_threshold[3] = (float)clouds->resolution;
 	field_noise_fill_block(block, clouds);
+	height_puffs_fill_block(block, clouds);
 	if (clouds->map.map) /* nothing is added to what a map says */
 		block->cloud_field[1] = block->cloud_field[3] = block->cloud_detail[3] = 0;
 }
@@ -234,7 +237,7 @@ static void build_levels(const struct field_stage *stage, const struct texture *
 {
 	for (int level = 0; level < field->levels; level++) {
 		struct texture below = level == 0 ? *heights : texture_level(field, level - 1);
-		const int size = level == 0 ? HEIGHT_SIDE : HEIGHT_SIDE >> (level - 1);
+		const int size = level == 0 ? heights->width : heights->width >> (level - 1);
 		pass_run(stage->passes[PASS_LEVELS], &(struct pass_run){.targets = (struct texture *[]){field},
 									.level = level,
 									.samplers = {&below},
@@ -244,11 +247,57 @@ static void build_levels(const struct field_stage *stage, const struct texture *
 	}
 }
 
-static struct texture *height_field_compute(const struct field_stage *stage, const struct coarse_field *coarse)
+/* Radius of curvature of the sharpest tops, over the thickness: the cells of a field are as wide as they are, however thick it is, and
+ * stretched over a thick one they would be spires. */
+static const double sharpest_top = 0.12;
+/* Thinner layers have no tops to speak of, m. */
+static const double flat_thickness = 250;
+
+static bool round_tops(const struct field_stage *stage, double thickness, double tile, struct texture *heights)
 {
+	const double radius = sharpest_top * thickness;
+	struct texture lowest = {0}, highest = {0}, rounded = {0};
+	const int whole = heights->width;
+	int side = whole / 2;
+	while (side > 32 && tile / side < 0.6 * radius)
+		side /= 2;
+	const double texel = tile / side, fall = texel * texel / (2 * radius);
+	const bool ok = texture_init(&lowest, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
+			texture_init(&highest, side, side, TEXTURE_R32F, TEXTURE_REPEAT) &&
+			texture_init(&rounded, whole, whole, TEXTURE_R32F, TEXTURE_REPEAT);
+	if (ok) {
+		const float level = log2f((float)whole / (float)side);
+		pass_run(stage->passes[PASS_OPEN], &(struct pass_run){.targets = (struct texture *[]){&lowest},
+								      .samplers = {heights},
+								      .arguments = {{(float)side, (float)fall, 1, level}}});
+		pass_run(stage->passes[PASS_OPEN], &(struct pass_run){.targets = (struct texture *[]){&highest},
+								      .samplers = {&lowest},
+								      .arguments = {{(float)side, (float)fall, -1, 0}}});
+		pass_run(stage->passes[PASS_ROUND],
+			 &(struct pass_run){.targets = (struct texture *[]){&rounded},
+					    .samplers = {heights, &highest},
+					    .arguments = {{(float)whole, (float)side, (float)(0.08 * thickness)}}});
+		texture_finish(heights);
+		*heights = rounded;
+		rounded = (struct texture){0};
+	}
+	texture_finish(&rounded);
+	texture_finish(&highest);
+	texture_finish(&lowest);
+	return ok;
+}
+
+static struct texture *height_field_compute(const struct field_stage *stage, const struct scene_clouds *clouds,
+					    const struct coarse_field *coarse)
+{
+	const int side = height_puffs_field_side(clouds);
 	struct texture heights = {0}, *field = calloc(1, sizeof *field);
-	if (!field || !height_compute(stage, coarse, HEIGHT_SIDE, &heights) ||
-	    !texture_init(field, HEIGHT_SIDE, HEIGHT_SIDE, TEXTURE_RG16, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
+	/* Where texels are larger than spires, there are none. */
+	const bool tops =
+		!clouds->map.map && clouds->thickness_m > flat_thickness && sharpest_top * clouds->thickness_m > 2 * clouds->tile_m / side;
+	if (!field || !height_compute(stage, coarse, side, &heights) ||
+	    (tops && !round_tops(stage, clouds->thickness_m, clouds->tile_m, &heights)) ||
+	    !texture_init(field, side, side, TEXTURE_RG16, TEXTURE_REPEAT | TEXTURE_MIPMAPS)) {
 		texture_finish(&heights);
 		texture_destroy(field);
 		return NULL;
@@ -274,7 +323,7 @@ static const struct texture *height_field_get(const struct field_stage *stage, s
 	if (field)
 		return field;
 	context->reused = false;
-	field = height_field_compute(stage, coarse);
+	field = height_field_compute(stage, &scene->clouds, coarse);
 	if (!field || !cache_keep(context->cache, &key, field, texture_bytes(field), texture_destroy))
 		return NULL;
 	return field;
@@ -338,7 +387,8 @@ static bool thickness_get(const struct field_stage *stage, struct stage_context 
 		return true;
 	maps->height = height_field_get(stage, context, scene, coarse);
 	maps->light = maps->height ? height_light_get(&stage->light, context, scene, maps->height) : NULL;
-	return maps->light;
+	maps->puffs = maps->light ? height_puffs_get(context) : NULL;
+	return maps->puffs;
 }
 
 /* Packed pictures take six times the memory. */

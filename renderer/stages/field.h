@@ -9,9 +9,10 @@
 
 #include "renderer/stages/field_noise.h"
 #include "renderer/stages/height_light.h"
+#include "renderer/stages/height_puffs.h"
 #include "renderer/stages/packed.h"
 
-enum { FIELD_PASS_COUNT = 4 };
+enum { FIELD_PASS_COUNT = 6 };
 
 struct field_stage {
 	struct pass *passes[FIELD_PASS_COUNT];
@@ -25,7 +26,9 @@ struct field_maps {
 	const struct texture *coarse, *detail; /* density before the threshold, and its detail */
 	const struct texture *thickness;       /* over the tile, m, in the frame of the drifting clouds, 256 texels a side */
 	const struct texture *smooth;          /* the same evened out */
-	const struct texture *height, *light;  /* finer thickness with its maxima, and the sun on it; NULL unless asked for */
+	/* Finer thickness with its maxima, the sun on it, and puffs still finer; NULL unless asked for. */
+	const struct texture *height, *light;
+	const struct height_puffs *puffs;
 	/* Packed, for views from below; coarse and detail NULL at resolutions where that would be too much memory. */
 	const struct texture *coarse_packed, *detail_packed, *smooth_packed;
 };

@@ -119,7 +119,7 @@ static struct texture *slices_create(const struct droplet_tables *tables, const 
 	bool ok = texture && slice && texels;
 	if (ok) {
 		fill(tables, span, from_above, slice, texels);
-		ok = texture_init_3d(texture, SLAB_SLICE_AZIMUTH_COUNT, SLAB_SLICE_VIEW_COUNT, planes, TEXTURE_RGBA16F);
+		ok = texture_init_3d(texture, SLAB_SLICE_AZIMUTH_COUNT, SLAB_SLICE_VIEW_COUNT, planes, TEXTURE_RGBA16F, 0);
 	}
 	if (ok)
 		texture_upload(texture, texels);

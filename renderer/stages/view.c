@@ -301,13 +301,12 @@ static bool run_up(struct view_stage *stage, const struct scene_block *block, co
 	return true;
 }
 
-/* Runs over rows of one kind after the other, each with the program made for it. `up`: how those that look up at the layer are run, or NULL
- * for the ordinary program. */
-static bool run_regions(struct view_stage *stage, const struct stage_context *context, const struct camera_view *view,
+/* Runs over rows [first, last) of one kind after the other, each with the program made for it. `up`: how those that look up at the layer
+ * are run, or NULL for the ordinary program. */
+static bool run_regions(struct view_stage *stage, const struct stage_context *context, const struct camera_view *view, int first, int last,
 			struct view_variant variant, struct pass_run *run, struct pass_run *up)
 {
-	const int last = view->first_row + view->height;
-	for (int first = view->first_row; first < last;) {
+	while (first < last) {
 		variant.region = region_of_row(&context->block, view, variant.side, first);
 		int end = first + 1;
 		while (end < last && region_of_row(&context->block, view, variant.side, end) == variant.region)
@@ -328,25 +327,66 @@ static bool run_regions(struct view_stage *stage, const struct stage_context *co
 	return true;
 }
 
-/* The whole with one program. Pictures that are rare have no programs for their parts. */
-static bool run_whole(struct view_stage *stage, const struct camera_view *view, struct view_variant variant, struct pass_run *run)
+/* Rows [first, last) with one program. Pictures that are rare have no programs for their parts. */
+static bool run_whole(struct view_stage *stage, int first, int last, struct view_variant variant, struct pass_run *run)
 {
 	variant.region = VIEW_MIXED;
 	const struct pass *pass = pass_of(stage, &variant);
-	run->first_row = view->first_row;
-	run->height = view->height;
+	run->first_row = first;
+	run->height = last - first;
 	if (pass)
 		pass_run(pass, run);
 	return pass;
+}
+
+/* Programs made only for this picture are not worth making three of. */
+static bool is_rare(const struct view_variant *variant)
+{
+	return variant->layers || variant->twilight;
+}
+
+/* What rows [first, last) of a view see of the layer below the camera; with all: also those that only see the sky. */
+static bool see_rows(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct camera_view *view,
+		     const struct field_maps *field, bool all, int first, int last, struct height_view *seen)
+{
+	bool ok = true;
+	for (int end; ok && first < last; first = end) {
+		const bool sky = !all && region_of_row(&context->block, view, VIEW_ABOVE, first) == VIEW_SKY;
+		for (end = first + 1; end < last && !all; end++)
+			if (sky != (region_of_row(&context->block, view, VIEW_ABOVE, end) == VIEW_SKY))
+				break;
+		end = all ? last : end;
+		ok = sky || height_view_run(&stage->height, scene, view, field, first, end, seen);
+	}
+	return ok;
+}
+
+/* Rows of one view, as many at a time as is held of what they see of the layer below the camera. */
+static bool run_view(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		     const struct camera_view *view, struct view_variant variant, struct pass_run *run, struct pass_run *up)
+{
+	struct height_view *seen = variant.side == VIEW_ABOVE ? inputs->seen : NULL;
+	const bool rare = is_rare(&variant), in_parts = seen && seen->place.height < scene->output.height;
+	const int last = view->first_row + view->height;
+	for (int first = view->first_row, end; first < last; first = end) {
+		end = in_parts && first + seen->place.height < last ? first + seen->place.height : last;
+		if (in_parts) {
+			seen->first_row = first;
+			if (!see_rows(stage, context, scene, view, inputs->field, rare, first, end, seen))
+				return false;
+		}
+		run->arguments[3][2] = seen ? (float)seen->first_row : 0;
+		if (!(rare ? run_whole(stage, first, end, variant, run) : run_regions(stage, context, view, first, end, variant, run, up)))
+			return false;
+	}
+	return true;
 }
 
 /* One view of the picture after the other. */
 static bool run_views(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
 		      struct view_variant variant, struct view_samples samples, struct pass_run *run)
 {
-	/* Programs made only for this picture are not worth making three of. */
-	const bool whole = variant.layers || variant.twilight;
-	const bool fast = !whole && variant.side == VIEW_BELOW && variant.shading == SHADING_SOLVED;
+	const bool fast = !is_rare(&variant) && variant.side == VIEW_BELOW && variant.shading == SHADING_SOLVED;
 	struct pass_run up = {.targets = run->targets, .width = run->targets[0]->width};
 	const struct view_up_inputs from = {.droplets = inputs->droplets,
 					    .slab_rows = inputs->slab_rows,
@@ -367,7 +407,7 @@ static bool run_views(struct view_stage *stage, struct stage_context *context, c
 		if (samples.per_side > 1)
 			set4(context->block.sun_disc_box, 0, 0, 0, 0);
 		stage_upload_block(context);
-		if (!(whole ? run_whole(stage, &view, variant, run) : run_regions(stage, context, &view, variant, run, fast ? &up : NULL)))
+		if (!run_view(stage, context, scene, inputs, &view, variant, run, fast ? &up : NULL))
 			return false;
 	}
 	return true;
@@ -459,16 +499,20 @@ end:
 	return ok;
 }
 
-/* What the picture sees of the layer below the camera, one view after the other. */
-static bool see_layer(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct field_maps *field,
-		      struct height_view *seen)
+/* What the picture sees of the layer below the camera, one view after the other; of one too large to be held it is left to those who draw
+ * it. */
+static bool see_layer(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
+		      bool alone, struct height_view *seen)
 {
+	const struct view_variant variant = view_variant_of(context, scene, inputs, !alone);
 	bool ok = height_view_create(scene, seen);
-	for (int i = 0; ok && i < camera_view_count(scene); i++) {
+	const bool whole = ok && seen->place.height == scene->output.height;
+	for (int i = 0; whole && ok && i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
 		view_fill_camera(&context->block, scene, &view);
 		stage_upload_block(context);
-		ok = height_view_run(&stage->height, scene, &view, field, seen);
+		ok = see_rows(stage, context, scene, &view, inputs->field, is_rare(&variant), view.first_row, view.first_row + view.height,
+			      seen);
 	}
 	return ok;
 }
@@ -498,7 +542,7 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	with_seen.seen = &seen;
 	const struct view_samples samples = side_of(scene, inputs) == VIEW_BELOW ? view_samples_of(scene) : (struct view_samples){1, 1};
 	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0), inputs->sun_cover) &&
-		  (side_of(scene, inputs) != VIEW_ABOVE || see_layer(stage, context, scene, inputs->field, &seen));
+		  (side_of(scene, inputs) != VIEW_ABOVE || see_layer(stage, context, scene, inputs, alone, &seen));
 	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;
 		const struct texture *made[VIEW_OUTPUTS] = {0};

@@ -55,7 +55,7 @@ struct view_inputs {
 	const struct sky_tables *sky;
 	const struct field_maps *field;
 	const struct radiosity_light *light; /* NULL without clouds */
-	const struct height_view *seen;      /* of the view stage's own making: what the pixels see of the layer from above */
+	struct height_view *seen;            /* of the view stage's own making: what the pixels see of the layer from above */
 	const struct texture *sea_sky;       /* what a sea mirrors; NULL for other grounds */
 	const struct sun_cover *sun_cover;   /* what the layer leaves of the beam; NULL: all of it */
 };

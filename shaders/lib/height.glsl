@@ -10,14 +10,13 @@ uniform sampler2D height_table;
 uniform sampler2D smooth_table;
 #endif
 
-// Texels a side.
-const float HEIGHT_SIZE = 1024.0;
+// Texels a side of the smooth one; of the height field: cloud_puffs.z.
 const float HEIGHT_SIZE_SMOOTH = 256.0;
 
 // Height of the top above the base at a place, m, seen at a footprint.
 float height_at(vec2 place, float footprint)
 {
-	float lod = max(0.0, log2(footprint * HEIGHT_SIZE / cloud_layer.z));
+	float lod = max(0.0, log2(footprint * cloud_puffs.z / cloud_layer.z));
 	return textureLod(height_table, (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z, lod).x * cloud_layer.y;
 }
 

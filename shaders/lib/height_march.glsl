@@ -7,11 +7,16 @@
 #define SHADERS_LIB_HEIGHT_MARCH
 #include "shaders/lib/height_detail.glsl"
 
-const int HEIGHT_ITERATIONS = 128;
+// At most: hops through empty space up to a cloud, steps through that, and clouds one behind the other.
+const int HEIGHT_HOPS = 64;
+const int HEIGHT_STEPS = 48;
+const int HEIGHT_APPROACHES = 12;
 // What is left of the light behind is no longer looked at.
-const float HEIGHT_OPAQUE = 0.02;
-// Pixels a side of the blocks that begin together.
-const int HEIGHT_BLOCK = 8;
+const float HEIGHT_OPAQUE = 0.04;
+// Share of a pixel that is not worth a place of its own.
+const float HEIGHT_HARDLY = 0.02;
+// Pixels a side of the blocks that begin together at last.
+const int HEIGHT_BLOCK = 2;
 // Over longer hops than half of such a cell the Earth's curve would count.
 const float HEIGHT_LEVEL_MAX = 8.0;
 
@@ -42,17 +47,18 @@ vec2 height_tap(vec2 uv, float level)
 }
 
 // Distance up to which no ray of a block, `radius` per distance around this one, meets any cloud; the end of the range or beyond where none
-// meets one at all.
-float height_block_start(vec3 direction, vec2 range, float radius)
+// meets one at all. begun: what is known to be empty.
+float height_block_start(vec3 direction, vec2 range, float radius, float begun)
 {
-	float texel = cloud_layer.z / HEIGHT_SIZE;
+	float texel = cloud_layer.z / cloud_puffs.z;
 	vec2 origin = (vec2(camera_position) - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
 	vec2 rate = vec2(direction) / cloud_layer.z;
 	float speed = max(length(vec2(direction)), 1e-3);
 	// Rays of the block that point further down reach the layer earlier.
-	float t = range.x * max(1.0 - radius / max(-direction.z, radius), 0.0);
-	float level = 4.0;
-	for (int i = 0; i < HEIGHT_ITERATIONS; i++) {
+	float t = max(range.x * max(1.0 - radius / max(-direction.z, radius), 0.0), begun);
+	float level = begun > 0.0 ? 2.0 : 4.0;
+	float puffs = HEIGHT_PUFF_TOP * height_puff_scale(cloud_layer.y);
+	for (int i = 0; i < HEIGHT_HOPS; i++) {
 		if (t >= range.y)
 			break;
 		float cell = texel * exp2(level);
@@ -61,7 +67,7 @@ float height_block_start(vec3 direction, vec2 range, float radius)
 		float around = radius * (t + hop);
 		float lowest = min(height_of_ray(direction.z, t), height_of_ray(direction.z, t + hop)) - around;
 		bool wide = 0.25 * cell >= around;
-		if (wide && lowest > height_tap(origin + rate * (t + 0.5 * hop), level).y + HEIGHT_PUFF_TOP * HEIGHT_PUFF) {
+		if (wide && lowest > height_tap(origin + rate * (t + 0.5 * hop), level).y + puffs) {
 			t += hop;
 			level = min(level + 1.0, HEIGHT_LEVEL_MAX);
 		} else {
@@ -89,8 +95,8 @@ height_path height_path_clear()
 	return path;
 }
 
-// Share of a step that lies in cloud, from the gaps between ray and top at its ends; `soft`: height over which the top varies in what the field does not
-// resolve.
+// Share of a step that lies in cloud, from the gaps between ray and top at its ends. `soft`: height over which rays of the pixel differ, and the top in what
+// the field does not resolve.
 float height_inside(float gap_before, float gap, float soft)
 {
 	return clamp(0.5 - 0.5 * (gap_before + gap) / max(abs(gap - gap_before) + soft, 1e-3), 0.0, 1.0);
@@ -102,98 +108,139 @@ float height_scattered(float depth)
 	return 1.0 - 1.0 / (1.0 + depth * (1.0 + depth * (0.5 + depth * (1.0 / 6.0))));
 }
 
-// HEIGHT_NEAR: puffs are looked for.
+// A ray as it looks for the height field.
+struct height_ray {
+	vec2 origin; // of the ray, and its heading, in tiles
+	vec2 rate;
+	float down;     // the ray's vertical part
+	float slowness; // over its horizontal one
+	float spread;   // what a pixel covers per distance
+};
+
+height_ray height_ray_of(vec3 direction, float pixel_angle)
+{
+	height_ray ray;
+	ray.origin = (vec2(camera_position) - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	ray.rate = vec2(direction) / cloud_layer.z;
+	ray.down = direction.z;
+	ray.slowness = 1.0 / max(length(vec2(direction)), 1e-3);
+	// A ray that meets the layer at a slant sees a long strip of it in one pixel.
+	ray.spread = pixel_angle * inversesqrt(clamp(-direction.z, 0.02, 1.0));
+	return ray;
+}
+
+// Distance from t on, or from end on, at which the surface may be within a texel or a pixel.
+float height_approach(height_ray ray, float t, float end)
+{
+	float texel = cloud_layer.z / cloud_puffs.z;
+	float level = 2.0;
+	for (int i = 0; i < HEIGHT_HOPS; i++) {
+		float cell = texel * exp2(level);
+		// A value between texels holds for half a cell around, so it is taken in the middle of the way that it is wanted for.
+		float hop = cell * ray.slowness;
+		float lowest = min(height_of_ray(ray.down, t), height_of_ray(ray.down, t + hop));
+		float top = height_tap(ray.origin + ray.rate * (t + 0.5 * hop), level).y;
+#if HEIGHT_NEAR
+		top += HEIGHT_PUFF_TOP * height_puff_scale(top);
+#endif
+		bool empty = lowest > top;
+		if (t > end || (!empty && cell <= 2.0 * max(ray.spread * t, texel)))
+			break;
+		t += empty ? hop : 0.0;
+		// Larger cells where there is room for them.
+		level = clamp(level + (empty ? step(0.3 * cell, lowest - top) : -1.0 - step(cell, top - lowest)), 1.0, HEIGHT_LEVEL_MAX);
+	}
+	return t;
+}
+
+// HEIGHT_NEAR: puffs stand on the tops (1), and smaller ones on them (2).
 // range: where to look, m. pixel_angle: angle between pixels.
 height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 {
-	float texel = cloud_layer.z / HEIGHT_SIZE;
-	vec2 origin = (vec2(camera_position) - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
-	vec2 rate = vec2(direction) / cloud_layer.z;
-	float slowness = 1.0 / max(length(vec2(direction)), 1e-3);
-	// A ray that meets the layer at a slant sees a long strip of it in one pixel.
-	float spread = pixel_angle * inversesqrt(clamp(-direction.z, 0.02, 1.0));
+	float texel = cloud_layer.z / cloud_puffs.z;
+	height_ray ray = height_ray_of(direction, pixel_angle);
 	// Steps short enough that a steep ray does not pass the layer in one.
 	float longest = cloud_layer.y / max(-direction.z, 0.01) * (1.0 / 16.0);
+	// Deep inside, the way between two scatterings needs no more than a few steps.
+	float dense = 0.8 / extinction_scaled.y;
 	height_path path = height_path_clear();
 	float t = range.x;
-	float level = 1.0;
-	float cell = 2.0 * texel;
-	float before = -1.0; // where the last sample was; none
-	float gap_before = 0.0;
 	bool behind = false;
 	// Distances are means over the outermost droplets: further in, a ray through a crest would find the side behind.
 	float outer = 1.0;
 	vec2 outer_weight = vec2(0.0);
-	for (int i = 0; i < HEIGHT_ITERATIONS; i++) {
-		if (t > range.y || path.clear < HEIGHT_OPAQUE)
+	for (int approach = 0; approach < HEIGHT_APPROACHES; approach++) {
+		if (path.clear < HEIGHT_OPAQUE)
 			break;
-		float width = max(spread * t, texel); // of what a pixel covers
-		bool fine = cell <= width;
-		// A value between texels holds for half a cell around, so it is taken in the middle of the way that it is wanted for.
-		float hop = cell * slowness;
-		float z = height_of_ray(direction.z, t);
-		float z_hop = height_of_ray(direction.z, t + hop);
-		vec2 tap = height_tap(origin + rate * (fine ? t : t + 0.5 * hop), level);
-#if HEIGHT_NEAR
-		float puff_depth = height_puff_depth(tap.x, t);
-		tap.y += HEIGHT_PUFF_TOP * puff_depth;
-#endif
-		if (!fine && min(z, z_hop) > tap.y) {
-			t += hop;
-			level = min(level + 1.0, HEIGHT_LEVEL_MAX);
-			cell = min(2.0 * cell, exp2(HEIGHT_LEVEL_MAX) * texel);
-			before = -1.0;
-			if (!behind && path.weight.x > 0.0) {
-				behind = true;
-				outer = 1.0;
-			}
-		} else if (!fine) {
-			level -= 1.0;
-			cell *= 0.5;
-		} else {
+		t = height_approach(ray, t, range.y);
+		if (t > range.y)
+			break;
+		float before = -1.0; // where the last sample was; none
+		float gap_before = 0.0;
+		// A crest hides no more of a pixel than it reaches up into it, however long the way through it is: what is left at least.
+		float clear_before = path.clear;
+		float highest = 0.0;
+		float passed = 1.0; // 1 where a crest lies behind the ray
+		for (int i = 0; i < HEIGHT_STEPS; i++) {
+			float width = ray.spread * t; // of what a pixel covers
+			float finest = max(width, texel);
+			float z = height_of_ray(direction.z, t);
+			vec2 tap = height_tap(ray.origin + ray.rate * t, log2(finest / texel));
+			float soft = pixel_angle * t + 0.2 * (tap.y - tap.x) * clamp(width / texel - 1.0, 0.0, 1.0);
 			// Where there is no cloud, what the base's height is off by is none either.
-			float gap = z - tap.x + 3.0 * max(1.0 - tap.x, 0.0);
-			float stride = 0.7 * width + (gap > 0.0 ? 0.35 : -0.8) * gap;
+			float gap = z - tap.x + (3.0 + soft) * max(1.0 - tap.x, 0.0);
+			float room = gap - (tap.y - tap.x) - 8.0 * finest;
 #if HEIGHT_NEAR
-			if (puff_depth > 0.0) {
-				float finest = max(spread * t, 0.3 * texel);
-				gap -= puff_depth * height_puff((origin + rate * t) * cloud_layer.z + vec2(cloud_drift.x, cloud_drift.y), finest);
-				stride = mix(stride, 0.7 * finest + (gap > 0.0 ? 0.35 : -0.8) * gap, puff_depth / HEIGHT_PUFF);
-			}
+			finest = max(width, 0.25 * texel);
+			float scale = height_puff_scale(tap.x);
+			room -= HEIGHT_PUFF_TOP * scale;
+			gap -= scale * height_bulge((ray.origin + ray.rate * t) * cloud_layer.z, z, width);
 #endif
+			float stride = gap > 0.0 ? 0.7 * finest + 0.55 * gap : max(0.7 * finest, dense * min(-0.05 * gap, 1.0)) - 0.8 * gap;
 			if (before >= 0.0) {
 				float length_m = t - before;
-				float soft = (tap.y - tap.x) * min(width / texel - 1.0, 1.0);
 				float inside = height_inside(gap_before, gap, soft);
-				float seen = path.clear * inside * height_scattered(extinction_scaled.y * length_m);
-				float outermost = outer * inside * height_scattered(4.0 * extinction_scaled.y * length_m);
+				if (inside == 0.0) {
+					clear_before = path.clear;
+					highest = 0.0;
+					passed = 1.0;
+				} else if (passed > 0.0) {
+					// The next crest. Of one that was hardly seen nothing is kept.
+					passed = 0.0;
+					behind = path.weight.x > HEIGHT_HARDLY;
+					bool again = (behind ? path.weight.y : path.weight.x) <= HEIGHT_HARDLY;
+					vec2 kept = again ? (behind ? vec2(1.0, 0.0) : vec2(0.0)) : vec2(1.0);
+					path.distance *= kept;
+					outer_weight *= kept;
+					outer = again ? 1.0 : outer;
+				}
+				highest = max(highest, inside);
+				float seen = min(path.clear * inside * height_scattered(extinction_scaled.y * length_m),
+				                 max(path.clear - clear_before * (1.0 - highest), 0.0));
+				// However little of the pixel is in the crest, it is seen where it is met.
+				float outermost = inside > 0.0 ? outer * height_scattered(4.0 * extinction_scaled.y * length_m) : 0.0;
 				// Where in the step: at its end on the way in.
 				float middle = gap < gap_before ? t - 0.75 * inside * length_m : before + 0.25 * inside * length_m;
-				if (!behind && path.weight.x > 0.02 && inside == 0.0) {
-					behind = true;
-					outer = 1.0;
-				}
 				vec2 to_which = behind ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 				path.weight += seen * to_which;
 				path.clear -= seen;
-				path.distance += outermost * middle * to_which;
-				outer_weight += outermost * to_which;
+				path.distance += outermost * inside * middle * to_which;
+				outer_weight += outermost * inside * to_which;
 				outer -= outermost;
-			}
-			if (gap > tap.y - tap.x + width) {
-				// Far above: larger cells again.
-				level += 1.0;
-				cell *= 2.0;
 			}
 			before = t;
 			gap_before = gap;
+			// High above: back to hops, from no farther than is known to be empty.
+			stride = room > 0.0 ? min(stride, finest) : stride;
 			// The last sample is at the end itself.
-			t = t < range.y ? min(t + min(stride * slowness, longest), range.y) : range.y + 1.0;
+			t = t < range.y ? min(t + min(stride * ray.slowness, longest), range.y) : range.y + 1.0;
+			if (t > range.y || path.clear < HEIGHT_OPAQUE || room > 0.0)
+				break;
 		}
 	}
-	if (t <= range.y && path.clear > HEIGHT_OPAQUE && height_tap(origin + rate * t, 5.0).x > 1.0) {
+	if (t <= range.y && path.clear > HEIGHT_OPAQUE && height_tap(ray.origin + ray.rate * t, 5.0).x > 1.0) {
 		// Out of steps, which happens far away along the tops: where there are any, there is always another cloud.
-		vec2 to_which = path.weight.x > 0.02 ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
+		vec2 to_which = path.weight.x > HEIGHT_HARDLY ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 		path.weight += path.clear * to_which;
 		path.distance += 1e-3 * t * to_which;
 		outer_weight += 1e-3 * to_which;

@@ -29,10 +29,10 @@ vec2 height_sun_heading()
 }
 
 // Share of the beam that reaches a top of some height where light or shadow of what stands towards the sun begins at `shade`, that height or more. A crest
-// lets the beam through over a part of a mean free path.
-float height_sunlit(float height, float shade)
+// lets the beam through over a part of a mean free path, and a pixel that covers much of both shows their mean: `soft`, m.
+float height_sunlit(float height, float shade, float soft)
 {
-	return 1.0 - smoothstep(0.0, 0.4 / extinction_scaled.y, shade - height);
+	return 1.0 - smoothstep(0.0, 0.4 / extinction_scaled.y + soft, shade - height);
 }
 
 // Share of the beam that a thickness scatters.
@@ -45,6 +45,6 @@ float height_caught(float thickness)
 float height_received(float height, vec2 slope, float shade)
 {
 	float facing = 1.0 - dot(slope, height_sun_heading()) / height_sun_rise();
-	return clamp(facing, 0.0, HEIGHT_GAIN_MAX) * height_sunlit(height, shade);
+	return clamp(facing, 0.0, HEIGHT_GAIN_MAX) * height_sunlit(height, shade, 0.0);
 }
 #endif

@@ -23,6 +23,8 @@ layout(std140, binding = 0) uniform scene_block {
 	vec4 cloud_layer;
 	vec4 cloud_field;
 	vec4 cloud_drift;
+	vec4 cloud_puffs;
+	vec4 cloud_puffs_drift;
 	vec4 cloud_detail;
 	vec4 cloud_threshold;
 	vec4 extinction;

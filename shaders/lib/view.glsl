@@ -225,10 +225,10 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 	float received = 1.0;
 #if VIEW_ABOVE
 	if (!through) {
-		// A facet turned away from light or view is faded out instead of cut.
-		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * smoothstep(-0.05, 0.10, p.mu_v_facet) * p.lit;
+		// A facet turned away from light is faded out instead of cut. One turned away from the view is not seen: what says so is the crest that a pixel is on.
+		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * p.lit;
 		m_l = max(p.mu_l_facet, 0.03);
-		m_v = max(p.mu_v_facet, 0.03);
+		m_v = max(p.mu_v_facet, 0.1);
 		thickness = p.way * m_v;
 		received = p.received;
 	}
@@ -368,6 +368,15 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 #endif
 
 #if VIEW_ABOVE
+// Light of the sky on a place of the top, relative to that on a flat one: what stands out of its surroundings sees more of it than what lies in between, and of a low
+// sun's sky the bright side is seen by the slopes that face it. Both vary about 1: what one place gets less, its neighbours get more.
+float view_sky_received(float standing_out, vec2 slope)
+{
+	float low = 1.0 - smoothstep(-0.05, 0.25, sun_direction.z);
+	float open = clamp(1.0 + 0.5 * standing_out, 0.55, 1.35);
+	return open * clamp(1.0 - 0.35 * low * dot(slope, height_sun_heading()), 0.6, 1.6);
+}
+
 // The cloud that a ray from above meets, as shaders/passes/height_view.glsl has it for the pixel.
 void view_cloud_top(vec3 direction, vec4 place, vec4 light, vec2 air, INOUT(view_parts) parts)
 {
@@ -386,7 +395,8 @@ void view_cloud_top(vec3 direction, vec4 place, vec4 light, vec2 air, INOUT(view
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
 	vec2 below = vec2(camera_position) + vec2(direction) * t;
 	view_layer_sunlight(p, to_layer * sun_irradiance(height, mu_sun), parts);
-	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud), to_layer * vec3(textureLod(cloud_received, below / cloud_layer.z, 0.0)), parts);
+	float sky_received = view_sky_received((place.z - place.w) / max(place.w, 0.25 * cloud_layer.y), vec2(light));
+	view_layer_diffuse(p, to_layer * vec3(sky_irradiance_cloud) * sky_received, to_layer * vec3(textureLod(cloud_received, below / cloud_layer.z, 0.0)), parts);
 	parts.distance = t;
 }
 #endif
@@ -407,7 +417,10 @@ void view_add_ground(vec3 direction, float high, vec2 air, INOUT(view_parts) par
 #if VIEW_ABOVE
 	vec3 near = vec3(textureLod(sky_near, air, 0.0));
 	vec3 below = max(vec3(textureLod(air_to_layer, air, 0.0)) - to_end, vec3(0.0));
-	parts.air = near + (max(total - near, vec3(0.0)) * vec3(air_below) + below * vec3(air_around)) * parts.transmittance;
+	// What lights the air at twilight comes from along the horizon: on its slant way it meets the layer several times over.
+	float slant = 1.0 - smoothstep(-0.03, 0.06, sun_direction.z);
+	vec3 share = vec3(air_below) * mix(vec3(1.0), vec3(air_below) * vec3(air_below), slant);
+	parts.air = near + (max(total - near, vec3(0.0)) * share + below * vec3(air_around)) * parts.transmittance;
 #else
 	parts.air = total * vec3(air_below) + (vec3(1.0) - to_end) * vec3(air_around); // 1 and 0 without clouds
 #endif

@@ -10,7 +10,7 @@ void pass(ivec2 pixel)
 {
 	vec2 at = (vec2(pixel) + 0.5) / HEIGHT_SIZE_LIGHT;
 	float texel = cloud_layer.z / HEIGHT_SIZE_LIGHT;
-	float height = textureLod(height_table, at, log2(HEIGHT_SIZE / HEIGHT_SIZE_LIGHT)).x * cloud_layer.y;
+	float height = textureLod(height_table, at, log2(cloud_puffs.z / HEIGHT_SIZE_LIGHT)).x * cloud_layer.y;
 	float shade = max(height, texelFetch(shadow_table, pixel, 0).x);
 	vec2 slope = height_slope(at * cloud_layer.z + vec2(cloud_drift.x, cloud_drift.y), 0.5 * texel);
 	// Thin cloud is lit throughout, whatever the shape of its surface.

@@ -12,7 +12,7 @@ void pass(ivec2 pixel)
 	vec2 here = (vec2(pixel) + 0.5) / HEIGHT_SIZE_LIGHT;
 	vec2 there = here + arguments[0].x * height_sun_heading();
 	if (arguments[0].z > 0.5) {
-		float lod = log2(HEIGHT_SIZE / HEIGHT_SIZE_LIGHT);
+		float lod = log2(cloud_puffs.z / HEIGHT_SIZE_LIGHT);
 		STORE(0, vec4(textureLod(height_table, there, lod).x * cloud_layer.y - arguments[0].y, 0.0, 0.0, 1.0));
 	} else {
 		float far = textureLod(shadow_below, there, 0.0).x - arguments[0].y;

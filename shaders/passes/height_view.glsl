@@ -1,5 +1,5 @@
 // What each pixel sees of the height field, which lies below the camera. 0: x mean distance, m; y way through cloud, m; z thickness there, m; w the thickness
-// evened out. 1: x, y slopes to the east and to the north; z share of the beam that comes there; w what often scattered light has received.
+// evened out. arguments[0].z: row of the picture that is the first here. 1: x, y slopes to the east and to the north; z share of the beam that comes there; w what often scattered light has received.
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/height_march.glsl"
 #include "shaders/lib/height_sun.glsl"
@@ -7,6 +7,9 @@
 #ifndef __cplusplus
 uniform sampler2D height_start;
 #endif
+
+// Height over which shadows end, a metre of what a pixel covers.
+const float HEIGHT_SHADOW_SOFT = 0.3;
 
 struct height_surface {
 	vec4 place; // as stored in 0, distance first
@@ -16,33 +19,33 @@ struct height_surface {
 height_surface height_surface_at(vec3 direction, float t)
 {
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
-	float footprint = camera_position.w * t * inversesqrt(clamp(-direction.z, 0.25, 1.0));
+	// What a pixel covers is longer than wide, which the means of squares stand for.
+	float footprint = camera_position.w * t * inversesqrt(clamp(-direction.z, 0.04, 1.0));
 	float height = height_at(place, footprint);
+	float shadow_edge = HEIGHT_SHADOW_SOFT * footprint;
 	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
 	vec4 light = textureLod(height_light, uv, max(log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z), 0.0));
 	float received = light.w;
 #if HEIGHT_NEAR
-	float depth = height_puff_depth(height, t);
-	if (depth > 0.0) {
-		float reach = max(footprint, HEIGHT_PUFF_FINEST);
-		float puff = height_puff(place, reach);
-		vec2 slope = vec2(height_puff(place + vec2(reach, 0.0), reach), height_puff(place + vec2(0.0, reach), reach)) - puff;
-		slope *= depth / reach;
-		light += vec4(slope, 0.0, 0.0);
-		// Of the light that is scattered often, creases get less, and slopes as they face the sun.
-		float facing = 1.0 - 0.3 * dot(slope, height_sun_heading()) / max(height_sun_rise(), 0.3);
-		received *= clamp(facing, 0.6, 1.5) * (1.0 + 0.25 * puff * depth / HEIGHT_PUFF);
-	}
+	float scale = height_puff_scale(height);
+	vec4 puff = height_puff(place - vec2(cloud_drift.x, cloud_drift.y), height_of_ray(direction.z, t), max(footprint, HEIGHT_PUFF_FINEST));
+	// The surface bulges on flanks, too.
+	vec2 slope = (vec2(light) + scale * vec2(puff.y, puff.z)) / max(1.0 - scale * puff.w, 0.4) - vec2(light);
+	light += vec4(slope, 0.0, 0.0);
+	height += scale * puff.x;
+	// Of the light that is scattered often, creases get less, and slopes as they face the sun.
+	float facing = 1.0 - 0.3 * dot(slope, height_sun_heading()) / max(height_sun_rise(), 0.3);
+	received *= clamp(facing, 0.6, 1.5) * (1.0 + 0.5 * puff.x);
 #endif
 	height_surface at;
 	at.place = vec4(t, 0.0, height, height_smooth(place, footprint));
-	at.light = vec4(light.x, light.y, height_sunlit(height, light.z), received);
+	at.light = vec4(light.x, light.y, height_sunlit(height, light.z, shadow_edge), received);
 	return at;
 }
 
 void pass(ivec2 pixel)
 {
-	vec3 direction = camera_ray(vec2(pixel) + 0.5);
+	vec3 direction = camera_ray(vec2(pixel) + vec2(0.5, arguments[0].z + 0.5));
 	vec2 range = height_range(direction);
 	height_path path = height_path_clear();
 	range.x = max(range.x, texelFetch(height_start, pixel / HEIGHT_BLOCK, 0).x);
@@ -54,8 +57,8 @@ void pass(ivec2 pixel)
 		STORE(1, vec4(0.0, 0.0, 1.0, 1.0));
 		return;
 	}
-	bool both = path.weight.y > 0.02;
-	height_surface surface = height_surface_at(direction, path.weight.x > 0.0 ? path.distance.x : path.distance.y);
+	bool both = path.weight.y > HEIGHT_HARDLY;
+	height_surface surface = height_surface_at(direction, path.distance.x);
 	if (both) {
 		height_surface second = height_surface_at(direction, path.distance.y);
 		surface.place = mix(surface.place, second.place, path.weight.y / weight);

@@ -1,5 +1,5 @@
 // The view stage: the color, or parts of the picture, chosen by `arguments`: for output i the layer arguments[0][i] (enum layer), and from arguments[1] on the shares
-// (0 or 1) of the color's ten summands that are shown.
+// (0 or 1) of the color's ten summands that are shown. arguments[3].z: row of the picture that is the first in what is seen of the layer from above.
 #include "shaders/lib/view.glsl"
 #include "shaders/lib/colour.glsl"
 
@@ -48,7 +48,8 @@ void pass(ivec2 pixel)
 	vec2 at = vec2(pixel) + 0.5;
 	vec3 disc = vec3(sun_at_camera) * sun_disc_share(pixel);
 #if VIEW_ABOVE
-	view_parts parts = view_ray_seen(camera_ray(at), disc, texelFetch(seen_place, pixel, 0), texelFetch(seen_light, pixel, 0));
+	ivec2 held = pixel - ivec2(0, int(arguments[3].z));
+	view_parts parts = view_ray_seen(camera_ray(at), disc, texelFetch(seen_place, held, 0), texelFetch(seen_light, held, 0));
 #else
 	view_parts parts = view_ray(camera_ray(at), disc);
 #endif

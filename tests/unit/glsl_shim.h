@@ -153,8 +153,8 @@ inline vec4 textureLod(const sampler3D &sampler, vec3 at, float)
 /* Samplers of the library. */
 static sampler2D field_coarse, field_detail, ground_map, sea_sky, height_table, height_light, height_start, smooth_table;
 static sampler2D height_below, shadow_below, shadow_table, received_table;
-static sampler2D probes, phase_table, event_table, slab_table;
-static sampler3D slab_slices;
+static sampler2D height_puff_layers, probes, phase_table, event_table, slab_table;
+static sampler3D slab_slices, height_puffs;
 static sampler2D transmittance_table, sky_total, sky_near, air_to_layer, air_to_end;
 static sampler2D ground_received, cloud_received, ground_irradiance, seen_place, seen_light;
 static sampler2D path_tops, path_bounds, phase_inverse, forward_chains, sky_at_layer, sky_at_ground;
@@ -188,6 +188,8 @@ static vec4 arguments[4], stored[8];
 	X(cloud_layer)                                                                                                                     \
 	X(cloud_field)                                                                                                                     \
 	X(cloud_drift)                                                                                                                     \
+	X(cloud_puffs)                                                                                                                     \
+	X(cloud_puffs_drift)                                                                                                               \
 	X(cloud_detail)                                                                                                                    \
 	X(cloud_threshold)                                                                                                                 \
 	X(extinction)                                                                                                                      \

@@ -124,6 +124,7 @@ static void make_field(const std::function<double(double, double)> &height)
 			heights->levels[0].texels.push_back(vec4((float)height((x + 0.5) * tile / SIDE, (y + 0.5) * tile / SIDE), 0, 0, 1));
 	glsl::cloud_layer = vec4(base, thickness, tile, 1);
 	glsl::cloud_drift = vec4(0);
+	glsl::cloud_puffs = vec4(0, 1000, SIDE, 0);
 	glsl::extinction_scaled = vec4((float)kappa);
 	auto field = std::make_shared<glsl::image>();
 	field->repeat_x = field->repeat_y = true;
@@ -204,7 +205,7 @@ static void rays_meet_what_brute_force_meets(void **)
 			const ray ray = random_ray(i % 2 ? 3000 : 1450);
 			const truth truth = brute_force(ray, 1);
 			vec2 range = ray.range;
-			range.x = std::fmax(range.x, glsl::march::height_block_start(ray.direction, range, 6 * glsl::camera_position.w));
+			range.x = std::fmax(range.x, glsl::march::height_block_start(ray.direction, range, 6 * glsl::camera_position.w, 0));
 			const glsl::march::height_path path = glsl::march::height_march(ray.direction, range, glsl::camera_position.w);
 			const double error = std::fabs((double)path.clear - truth.clear);
 			assert_true(path.clear >= 0 && path.clear <= 1 && std::fabs(path.clear + path.weight.x + path.weight.y - 1) < 1e-4);
@@ -232,7 +233,7 @@ static void blocks_start_before_all_their_rays(void **)
 	for (int i = 0; i < 150; i++) {
 		const ray middle = random_ray(i % 3 ? 2500 : 1500);
 		const double radius = 0.01;
-		const double start = (double)glsl::march::height_block_start(middle.direction, middle.range, (float)radius);
+		const double start = (double)glsl::march::height_block_start(middle.direction, middle.range, (float)radius, 0);
 		assert_true(std::isfinite(start));
 		for (int k = 0; k < 8; k++) {
 			const double angle = 2 * pi * k / 8;
@@ -266,7 +267,7 @@ static void grazing_rays_are_finite(void **)
 			const vec2 range = glsl::march::height_range(direction);
 			if (range.x > range.y)
 				continue;
-			const float start = glsl::march::height_block_start(direction, range, 0.006f);
+			const float start = glsl::march::height_block_start(direction, range, 0.006f, 0);
 			const glsl::march::height_path path =
 				glsl::march::height_march(direction, vec2(std::fmax(start, range.x), range.y), 1e-3f);
 			assert_true(std::isfinite(path.clear) && std::isfinite(path.distance.x) && std::isfinite(path.distance.y));
@@ -336,7 +337,7 @@ static void a_wall_throws_its_shadow(void **)
 		const double texel = tile / LIGHT_SIDE, length = 0.7 * thickness / std::tan(8 * pi / 180);
 		const auto column = [&](double from_middle) { return LIGHT_SIDE / 2 + (int)std::lround(away * from_middle / texel); };
 		const auto sunlit = [&](double from_middle) {
-			return (double)glsl::received::height_sunlit(0.25f * (float)thickness, light_texel(column(from_middle), row).z);
+			return (double)glsl::received::height_sunlit(0.25f * (float)thickness, light_texel(column(from_middle), row).z, 0);
 		};
 		assert_true(sunlit(300 + 0.85 * length) < 0.05 && sunlit(300 + 0.3 * length) < 0.05);
 		assert_true(sunlit(300 + 1.2 * length) > 0.95 && sunlit(-300 - 0.3 * length) > 0.95);

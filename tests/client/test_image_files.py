@@ -70,7 +70,10 @@ def test_png_metadata(samples):
     parts = list(chunks(samples / "8-fast.png"))
     names = [name for name, _ in parts]
     assert "sRGB" in names and "tIME" not in names
-    assert dict(parts)["iTXt"] == b"stratus:scene\0\0\0\0\0" + SCENE.encode()
+    assert [text for name, text in parts if name == "iTXt"][:2] == [
+        b"stratus:scene\0\0\0\0\0" + SCENE.encode(),
+        b"stratus:exposure_ev\0\0\0\0\0-1.5000",
+    ]
 
 
 @pytest.mark.parametrize("compression", ["none", "rle", "zip", "piz", "dwaa"])

@@ -2,6 +2,7 @@
 
 #include "renderer/log.h"
 #include "renderer/stages/colour.h"
+#include "renderer/stages/view_mesh.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -275,21 +276,58 @@ static bool row_has_disc(const struct scene_block *block, bool large, int row)
 	return large || (row >= block->sun_disc_box[1] && row < block->sun_disc_box[1] + block->sun_disc_box[3]);
 }
 
-/* Rows [first, end) up at the layer, as `run` was prepared by view_up_prepare. */
+/* How the rows of a view that look up at the layer are run. */
+struct up_runs {
+	struct pass_run table, mesh; /* as view_up_prepare leaves them */
+};
+
+enum up_kind { UP_FAR, UP_NEAR, UP_MESH_FAR, UP_MESH_NEAR };
+
+static enum up_kind up_kind_of(const struct scene_block *block, const struct camera_view *view, struct view_variant variant, int row)
+{
+	double lowest, highest;
+	bound_row(view, row, &lowest, &highest);
+	const bool near = row_is_near(block, view, row);
+	if (variant.packed && !variant.large_sun && view_mesh_shows(view, lowest))
+		return near ? UP_MESH_NEAR : UP_MESH_FAR;
+	return near && !row_has_disc(block, variant.large_sun, row) ? UP_NEAR : UP_FAR;
+}
+
+static bool run_up_tables(struct view_stage *stage, struct view_variant variant, struct pass_run *run, bool near,
+			  const struct view_mesh_part *part)
+{
+	const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, near, variant.large_sun);
+	if (!pass)
+		return false;
+	run->first_row = part->first_row;
+	run->first_column = part->first_column;
+	run->height = part->end_row - part->first_row;
+	run->width = part->end_column - part->first_column;
+	if (run->width > 0 && run->height > 0)
+		pass_run(pass, run);
+	return true;
+}
+
+/* Rows [first, end) up at the layer. */
 static bool run_up(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view, struct view_variant variant,
-		   struct pass_run *run, int first, int end)
+		   struct up_runs *runs, int first, int end)
 {
 	for (int next; first < end; first = next) {
-		const bool near = row_is_near(block, view, first) && !row_has_disc(block, variant.large_sun, first);
+		struct view_mesh_part part = {.first_row = first, .end_column = view->width};
+		const enum up_kind kind = up_kind_of(block, view, variant, first);
 		for (next = first + 1; next < end; next++)
-			if (near != (row_is_near(block, view, next) && !row_has_disc(block, variant.large_sun, next)))
+			if (up_kind_of(block, view, variant, next) != kind)
 				break;
-		const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, near, variant.large_sun);
-		if (!pass)
+		part.end_row = next;
+		if (kind == UP_MESH_NEAR || kind == UP_MESH_FAR) {
+			const struct pass *pass = view_up_mesh_pass(&stage->up, kind == UP_MESH_NEAR, (int)block->cloud_field[2]);
+			if (!pass)
+				return false;
+			view_mesh_run(pass, block, view, &runs->mesh, first, next);
+			part = view_mesh_around_sun(block, view, first, next);
+		}
+		if (!run_up_tables(stage, variant, &runs->table, kind == UP_NEAR, &part))
 			return false;
-		run->first_row = first;
-		run->height = next - first;
-		pass_run(pass, run);
 	}
 	return true;
 }
@@ -297,7 +335,7 @@ static bool run_up(struct view_stage *stage, const struct scene_block *block, co
 /* Runs over rows of one kind after the other, each with the program made for it. `up`: how those that look up at the layer are run, or NULL
  * for the ordinary program. */
 static bool run_regions(struct view_stage *stage, const struct stage_context *context, const struct camera_view *view,
-			struct view_variant variant, struct pass_run *run, struct pass_run *up)
+			struct view_variant variant, struct pass_run *run, struct up_runs *up)
 {
 	const int last = view->first_row + view->height;
 	for (int first = view->first_row; first < last;) {
@@ -340,16 +378,16 @@ static bool run_views(struct view_stage *stage, struct stage_context *context, c
 	/* Programs made only for this picture are not worth making three of. */
 	const bool whole = variant.layers || variant.twilight;
 	const bool fast = !whole && variant.side == VIEW_BELOW && variant.shading == SHADING_SOLVED;
-	struct pass_run up = {.targets = run->targets, .width = run->targets[0]->width};
+	struct up_runs up = {.table = {.targets = run->targets}, .mesh = {.targets = run->targets, .width = run->targets[0]->width}};
 	const struct view_up_inputs from = {.droplets = inputs->droplets,
 					    .slab_rows = inputs->slab_rows,
 					    .slab_slices = inputs->slab_slices,
 					    .sky = inputs->sky,
 					    .field = inputs->field,
 					    .light = inputs->light};
-	if (fast && !view_up_prepare(&stage->up, context, scene, &from, &up))
+	if (fast && !view_up_prepare(&stage->up, context, scene, &from, &up.table, &up.mesh))
 		return false;
-	run->width = up.width;
+	run->width = run->targets[0]->width;
 	for (int i = 0; i < camera_view_count(scene); i++) {
 		const struct camera_view view = camera_view_of(scene, i);
 		variant.projection = view.projection;

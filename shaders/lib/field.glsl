@@ -35,10 +35,10 @@ const int FIELD_DETAIL_SIZE = 512;
 float field_coarse_at(vec2 uv, float octaves)
 {
 #if defined(FIELD_PACKED) && defined(FIELD_NEAR)
-	return packed_spline(field_coarse, uv, int(cloud_threshold.w), 0);
+	return packed_spline(field_coarse, uv, int(cloud_threshold.w));
 #elif defined(FIELD_PACKED)
 	int side = int(cloud_threshold.w);
-	return mix(packed_linear_between(field_coarse, uv, side, octaves), packed_spline(field_coarse, uv, side, 0), clamp(-octaves, 0.0, 1.0));
+	return mix(packed_linear_between(field_coarse, uv, side, octaves), packed_spline(field_coarse, uv, side), clamp(-octaves, 0.0, 1.0));
 #else
 	return field_bicubic(field_coarse, uv, cloud_threshold.w, octaves);
 #endif
@@ -65,16 +65,22 @@ vec2 field_detail_place(vec2 p, float density)
 	return (p - vec2(cloud_detail.y, cloud_detail.z) + cloud_field.y * density * vec2(1.0, 0.6)) / cloud_detail.x;
 }
 
-// The field before its threshold. place: metres east and north of the tile's corner; footprint: size of the pixel there, m.
-float field_density(vec2 place, float footprint)
+// Tiles of detail, when the number is known before the program is built: loops cost software renderers a run even of none.
+#ifdef FIELD_DETAILS
+#define FIELD_DETAIL_COUNT FIELD_DETAILS
+#else
+#define FIELD_DETAIL_COUNT int(cloud_field.z)
+#endif
+
+// The field before its threshold. place: metres east and north of the tile's corner; octaves: field_octaves.
+float field_density_at(vec2 place, float octaves)
 {
 	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
-	float octaves = field_octaves(footprint);
 	float density = field_coarse_at(p / cloud_layer.z, octaves);
 	vec2 uv = field_detail_place(p, density);
 	float sum = field_detail_at(uv, octaves + 3.0);
 	float weight = 0.5;
-	for (int i = 1; i < int(cloud_field.z); i++) {
+	for (int i = 1; i < FIELD_DETAIL_COUNT; i++) {
 		uv *= FIELD_DETAIL_STEP;
 		sum += weight * field_detail_at(uv, octaves + 6.0);
 		weight *= 0.5;
@@ -84,19 +90,35 @@ float field_density(vec2 place, float footprint)
 	return density;
 }
 
-// Thickness H in m, 0..maximum, of a density. The threshold is softened over what the footprint hides.
-float field_thickness_of(float density, float footprint)
+// footprint: size of the pixel there, m.
+float field_density(vec2 place, float footprint)
+{
+	return field_density_at(place, field_octaves(footprint));
+}
+
+// The threshold is softened over what the footprint hides: over so much to either side, in shares of the range above it.
+float field_softness(float octaves)
+{
+	// What is finer than the footprint varies as its cubic root, with the spectrum k^(-8/3).
+	float hidden = exp2(min(octaves + 1.0, 5.0) * (1.0 / 3.0));
+	return 0.003 + 0.8 * cloud_detail.w * cloud_threshold.y * hidden;
+}
+
+// Thickness H in m, 0..maximum, of a density.
+float field_thickness_soft(float density, float softness)
 {
 	float excess = (density - cloud_threshold.x) * cloud_threshold.y;
-	// What is finer than the footprint varies as its cubic root, with the spectrum k^(-8/3).
-	float hidden = exp2(min(field_octaves(footprint) + 1.0, 5.0) * (1.0 / 3.0));
-	float softness = 0.003 + 0.8 * cloud_detail.w * cloud_threshold.y * hidden;
 	// Mean of what is above the threshold, of values spread evenly by the softness to either side.
 	float above = max(excess + softness, 0.0);
 	float soft = excess > softness ? excess : above * above / (4.0 * softness);
 	// A thin skirt around a thick middle: edges are translucent over some 100 m. A map says itself how thick its clouds are.
 	float share = (1.0 - pow(max(1.0 - soft, 0.0), cloud_threshold.z)) * soft * (1.0 + cloud_field.x) / (soft + cloud_field.x);
 	return cloud_layer.y * clamp(cloud_threshold.z > 0.0 ? share : density, 0.0, 1.0);
+}
+
+float field_thickness_of(float density, float footprint)
+{
+	return field_thickness_soft(density, field_softness(field_octaves(footprint)));
 }
 
 // The same for a shadow, whose penumbra hides the detail and which is seen at a slant: no spline, but two levels whose texels blur as much.

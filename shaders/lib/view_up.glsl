@@ -150,15 +150,20 @@ vec3 up_single(vec3 tau, float mu_l, float mu_v, vec3 along_light, vec3 along_vi
 	return tau / mu_v * mix(exact, series, lessThan(x, vec3(0.01)));
 }
 
-// Thickness evened out over the way that light goes sideways, m.
-float up_smooth_thickness(vec2 place, float footprint)
+// Thickness evened out over the way that light goes sideways, m. octaves: by which the footprint is larger than a texel of it.
+float up_smooth_thickness_at(vec2 place, float octaves)
 {
 	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
 #ifdef FIELD_NEAR
-	return packed_linear(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), 0);
+	return packed_linear(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), 0.0);
 #else
-	return packed_linear_between(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), log2(footprint * HEIGHT_SIZE_SMOOTH / cloud_layer.z));
+	return packed_linear_between(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), octaves);
 #endif
+}
+
+float up_smooth_thickness(vec2 place, float footprint)
+{
+	return up_smooth_thickness_at(place, log2(footprint * HEIGHT_SIZE_SMOOTH / cloud_layer.z));
 }
 
 // What arrives along a ray that meets the layer from below, W/m2/nm/sr. disc: radiance of the sun's disc in the pixel (shaders/lib/sun_disc.glsl).

@@ -271,6 +271,14 @@ static bool row_is_near(const struct scene_block *block, const struct camera_vie
 	return mu_v > 0.01 && block->camera_position[3] * distance / slant < block->cloud_layer[2] / texels;
 }
 
+/* Does a direction of this sine of elevation see the layer along it? FIELD_ALONG_COSINE in shaders/lib/field.glsl. */
+static bool sees_along(const struct scene_block *block, double sine)
+{
+	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0], along_cosine = 0.12;
+	const double b = (radius + h) * sine, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
+	return b + distance < along_cosine * (radius + base);
+}
+
 static bool row_has_disc(const struct scene_block *block, bool large, int row)
 {
 	return large || (row >= block->sun_disc_box[1] && row < block->sun_disc_box[1] + block->sun_disc_box[3]);
@@ -281,22 +289,31 @@ struct up_runs {
 	struct pass_run table, mesh; /* as view_up_prepare leaves them */
 };
 
-enum up_kind { UP_FAR, UP_NEAR, UP_MESH_FAR, UP_MESH_NEAR };
+enum up_kind {
+	UP_FAR = VIEW_UP_FAR,
+	UP_NEAR = VIEW_UP_NEAR,
+	UP_ALONG = VIEW_UP_ALONG,
+	UP_SOME_ALONG = VIEW_UP_SOME_ALONG,
+	UP_MESH_FAR,
+	UP_MESH_NEAR
+};
 
 static enum up_kind up_kind_of(const struct scene_block *block, const struct camera_view *view, struct view_variant variant, int row)
 {
 	double lowest, highest;
 	bound_row(view, row, &lowest, &highest);
 	const bool near = row_is_near(block, view, row);
-	if (variant.packed && !variant.large_sun && view_mesh_shows(view, lowest))
+	if (variant.packed && !variant.large_sun && view_mesh_shows(view, lowest) && !sees_along(block, lowest))
 		return near ? UP_MESH_NEAR : UP_MESH_FAR;
+	if (view->projection != PROJECTION_FISHEYE && sees_along(block, lowest))
+		return sees_along(block, fmin(highest, 1)) ? UP_ALONG : UP_SOME_ALONG;
 	return near && !row_has_disc(block, variant.large_sun, row) ? UP_NEAR : UP_FAR;
 }
 
-static bool run_up_tables(struct view_stage *stage, struct view_variant variant, struct pass_run *run, bool near,
+static bool run_up_tables(struct view_stage *stage, struct view_variant variant, struct pass_run *run, enum view_up_reach reach,
 			  const struct view_mesh_part *part)
 {
-	const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, near, variant.large_sun);
+	const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, reach, variant.large_sun);
 	if (!pass)
 		return false;
 	run->first_row = part->first_row;
@@ -319,14 +336,15 @@ static bool run_up(struct view_stage *stage, const struct scene_block *block, co
 			if (up_kind_of(block, view, variant, next) != kind)
 				break;
 		part.end_row = next;
-		if (kind == UP_MESH_NEAR || kind == UP_MESH_FAR) {
+		const bool mesh = kind == UP_MESH_NEAR || kind == UP_MESH_FAR;
+		if (mesh) {
 			const struct pass *pass = view_up_mesh_pass(&stage->up, kind == UP_MESH_NEAR, (int)block->cloud_field[2]);
 			if (!pass)
 				return false;
 			view_mesh_run(pass, block, view, &runs->mesh, first, next);
 			part = view_mesh_around_sun(block, view, first, next);
 		}
-		if (!run_up_tables(stage, variant, &runs->table, kind == UP_NEAR, &part))
+		if (!run_up_tables(stage, variant, &runs->table, mesh ? VIEW_UP_FAR : (enum view_up_reach)kind, &part))
 			return false;
 	}
 	return true;

@@ -2,10 +2,10 @@
 
 #include <math.h>
 
-/* Angles, rad. Light around the sun, first of all the droplets' and the haze's aureole, changes by its own size over about its distance from
- * the sun; what the air adds does so over the height above the horizon. */
-static const double cell_largest = 0.040, cell_smallest = 0.012, around_sun = 0.085, share_of_distance = 0.15;
-static const double lowest_shown = 0.045; /* sine of elevation */
+/* Angles, rad. Light around the sun, first of all the droplets' and the haze's aureole, changes by its own size over about its distance
+ * from the sun; what the air adds does so over the height above the horizon. */
+static const double cell_largest = 0.040, cell_smallest = 0.012, around_sun = 0.085, share_of_distance = 0.16;
+static const double lowest_shown = 0.05; /* sine of elevation */
 enum { CELL_PIXELS = 1 };
 
 bool view_mesh_shows(const struct camera_view *view, double lowest_sine)
@@ -74,7 +74,8 @@ void view_mesh_run(const struct pass *pass, const struct scene_block *block, con
 	double sun[2];
 	const bool has_sun = find_sun(block, view, sun);
 	/* Row of the horizon, of an upright camera. */
-	const double horizon = view->first_row + view->height * 0.5 * (1 + view->axes[2][2] / fmax(view->axes[1][2], 1e-3) / view->tangent[1]);
+	const double horizon =
+		view->first_row + view->height * 0.5 * (1 + view->axes[2][2] / fmax(view->axes[1][2], 1e-3) / view->tangent[1]);
 	const double places[2] = {horizon, sun[1]};
 	const struct pass_mesh mesh = {.columns = columns,
 				       .rows = rows,

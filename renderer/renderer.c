@@ -280,8 +280,8 @@ static struct scene_light scene_light_of(const struct job *job)
 static const double exposure_above_ev = 0.25;
 
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
- * most of all, sunlight on the ground by a third, and a little of the beam itself, which a low sun sends along the ground into the sky that
- * is looked at. A white sheet in that light comes out at 0.55 before tone, and full sunlight as a camera has it at 1/100 s, f/16 and ISO
+ * most of all, sunlight on the ground by a fifth, and a little of the beam itself, which a low sun sends along the ground into the sky that
+ * is looked at. A white sheet in that light comes out at 0.6 before tone, and full sunlight as a camera has it at 1/100 s, f/16 and ISO
  * 100; most of a change of light is followed, as an eye does, but not all, so that dusk stays darker than noon. */
 static double exposure_of(const struct job *job)
 {
@@ -289,8 +289,8 @@ static double exposure_of(const struct job *job)
 		return job->scene->output.exposure_ev;
 	const bool above = scene_has_clouds(job->scene) && job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
 	const struct scene_light light = scene_light_of(job);
-	const double lux = fmax(0.65 * light.diffuse + 0.32 * light.direct + 0.06 * light.beam, 1e-2);
-	return log2(0.55 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) +
+	const double lux = fmax(0.65 * light.diffuse + 0.21 * light.direct + 0.08 * light.beam, 1e-2);
+	return log2(0.6 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) +
 	       (above ? exposure_above_ev * light.direct / (light.direct + light.diffuse + 1e-9) : 0);
 }
 

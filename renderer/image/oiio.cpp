@@ -141,6 +141,9 @@ bytes encode_png(const struct frame &frame, const struct scene &scene, const str
 				png = std::move(other);
 		}
 	}
+	char exposure[32];
+	std::snprintf(exposure, sizeof exposure, "%.4f", frame.exposure_ev);
+	png_insert_text(png, "stratus:exposure_ev", exposure);
 	png_insert_text(png, "stratus:scene", metadata.scene_json);
 	return png;
 }

@@ -133,3 +133,13 @@ def test_exposure(daemon, read_image):
         scene = {"output": {"width": 64, "height": 48, "exposure_ev": exposure - 3, "tone": "linear"}}
         means.append(read_image(daemon.render(scene).body)[0].mean())
     assert means[0] < means[1] < means[2]
+
+
+def test_png_says_its_exposure(daemon, read_image):
+    small = {"width": 64, "height": 48}
+    _, png = read_image(daemon.render({"output": small}).body)
+    _, exr = read_image(daemon.render({"output": {**small, "format": "exr"}}).body)
+    automatic = float(png.getattribute("stratus:exposure_ev"))
+    assert automatic == pytest.approx(exr.getattribute("stratus:exposure_ev"), abs=1e-3)
+    said = daemon.render({"output": {**small, "exposure_ev": round(automatic, 4)}})
+    assert (read_image(said.body)[0] == read_image(daemon.render({"output": small}).body)[0]).mean() > 0.99

@@ -86,7 +86,7 @@ static bool warm_up(struct renderer *renderer, double *milliseconds)
 static bool choose_pass_kind(struct renderer *renderer, const struct renderer_params *params)
 {
 	double fragment, compute;
-	struct pass_compiler compiler = {.kind = PASS_FRAGMENT, .shader_dir = params->shader_dir};
+	struct pass_compiler compiler = {.kind = PASS_FRAGMENT, .software = renderer->info.software, .shader_dir = params->shader_dir};
 	if (!compile_stages(renderer, &compiler) || !warm_up(renderer, &fragment))
 		return false;
 	renderer->info.pass_kind = PASS_FRAGMENT;
@@ -108,7 +108,8 @@ static bool choose_pass_kind(struct renderer *renderer, const struct renderer_pa
 static bool start_stages(struct renderer *renderer, const struct renderer_params *params)
 {
 	double milliseconds;
-	const struct pass_compiler compiler = {.kind = params->pass_kind, .shader_dir = params->shader_dir};
+	const struct pass_compiler compiler = {
+		.kind = params->pass_kind, .software = renderer->info.software, .shader_dir = params->shader_dir};
 	if (params->pass_kind == PASS_AUTO)
 		return choose_pass_kind(renderer, params);
 	renderer->info.pass_kind = params->pass_kind;

@@ -35,10 +35,10 @@ const int FIELD_DETAIL_SIZE = 512;
 float field_coarse_at(vec2 uv, float octaves)
 {
 #if defined(FIELD_PACKED) && defined(FIELD_NEAR)
-	return packed_spline(field_coarse, uv, int(cloud_threshold.w), 0);
+	return packed_spline(field_coarse, uv, int(cloud_threshold.w));
 #elif defined(FIELD_PACKED)
 	int side = int(cloud_threshold.w);
-	return mix(packed_linear_between(field_coarse, uv, side, octaves), packed_spline(field_coarse, uv, side, 0), clamp(-octaves, 0.0, 1.0));
+	return mix(packed_linear_between(field_coarse, uv, side, octaves), packed_spline(field_coarse, uv, side), clamp(-octaves, 0.0, 1.0));
 #else
 	return field_bicubic(field_coarse, uv, cloud_threshold.w, octaves);
 #endif
@@ -65,38 +65,76 @@ vec2 field_detail_place(vec2 p, float density)
 	return (p - vec2(cloud_detail.y, cloud_detail.z) + cloud_field.y * density * vec2(1.0, 0.6)) / cloud_detail.x;
 }
 
-// The field before its threshold. place: metres east and north of the tile's corner; footprint: size of the pixel there, m.
-float field_density(vec2 place, float footprint)
+// Tiles of detail, when the number is known before the program is built: loops cost software renderers a run even of none.
+#ifdef FIELD_DETAILS
+#define FIELD_DETAIL_COUNT FIELD_DETAILS
+#else
+#define FIELD_DETAIL_COUNT int(cloud_field.z)
+#endif
+
+// Sum of the tiles of detail at a place p in the drifting field.
+float field_detail_sum(vec2 p, float density, float octaves)
 {
-	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
-	float octaves = field_octaves(footprint);
-	float density = field_coarse_at(p / cloud_layer.z, octaves);
 	vec2 uv = field_detail_place(p, density);
 	float sum = field_detail_at(uv, octaves + 3.0);
 	float weight = 0.5;
-	for (int i = 1; i < int(cloud_field.z); i++) {
+	for (int i = 1; i < FIELD_DETAIL_COUNT; i++) {
 		uv *= FIELD_DETAIL_STEP;
 		sum += weight * field_detail_at(uv, octaves + 6.0);
 		weight *= 0.5;
 		octaves += 3.0;
 	}
-	density += cloud_detail.w * sum;
-	return density;
+	return sum;
 }
 
-// Thickness H in m, 0..maximum, of a density. The threshold is softened over what the footprint hides.
-float field_thickness_of(float density, float footprint)
+// The field alone, where pixels are larger than texels.
+float field_far_at(vec2 place, float octaves)
+{
+	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+#ifdef FIELD_PACKED
+	return packed_linear_between(field_coarse, uv, int(cloud_threshold.w), octaves);
+#else
+	return textureLod(field_coarse, uv, max(octaves, 0.0)).x;
+#endif
+}
+
+// The field before its threshold. place: metres east and north of the tile's corner; octaves: field_octaves.
+float field_density_at(vec2 place, float octaves)
+{
+	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
+	float density = field_coarse_at(p / cloud_layer.z, octaves);
+	return density + cloud_detail.w * field_detail_sum(p, density, octaves);
+}
+
+// footprint: size of the pixel there, m.
+float field_density(vec2 place, float footprint)
+{
+	return field_density_at(place, field_octaves(footprint));
+}
+
+// The threshold is softened over what the footprint hides: over so much to either side, in shares of the range above it.
+float field_softness(float octaves)
+{
+	// What is finer than the footprint varies as its cubic root, with the spectrum k^(-8/3).
+	float hidden = exp2(min(octaves + 1.0, 5.0) * (1.0 / 3.0));
+	return 0.003 + 0.8 * cloud_detail.w * cloud_threshold.y * hidden;
+}
+
+// Thickness H in m, 0..maximum, of a density.
+float field_thickness_soft(float density, float softness)
 {
 	float excess = (density - cloud_threshold.x) * cloud_threshold.y;
-	// What is finer than the footprint varies as its cubic root, with the spectrum k^(-8/3).
-	float hidden = exp2(min(field_octaves(footprint) + 1.0, 5.0) * (1.0 / 3.0));
-	float softness = 0.003 + 0.8 * cloud_detail.w * cloud_threshold.y * hidden;
 	// Mean of what is above the threshold, of values spread evenly by the softness to either side.
 	float above = max(excess + softness, 0.0);
 	float soft = excess > softness ? excess : above * above / (4.0 * softness);
 	// A thin skirt around a thick middle: edges are translucent over some 100 m. A map says itself how thick its clouds are.
 	float share = (1.0 - pow(max(1.0 - soft, 0.0), cloud_threshold.z)) * soft * (1.0 + cloud_field.x) / (soft + cloud_field.x);
 	return cloud_layer.y * clamp(cloud_threshold.z > 0.0 ? share : density, 0.0, 1.0);
+}
+
+float field_thickness_of(float density, float footprint)
+{
+	return field_thickness_soft(density, field_softness(field_octaves(footprint)));
 }
 
 // The same for a shadow, whose penumbra hides the detail and which is seen at a slant: no spline, but two levels whose texels blur as much.
@@ -110,6 +148,38 @@ float field_thickness_shadow(vec2 place, float footprint)
 	float density = textureLod(field_coarse, uv, lod).x;
 #endif
 	return field_thickness_of(density, footprint);
+}
+
+// Along the horizon a pixel covers a long strip of the layer, over which light is averaged, not thickness: single thicknesses would come out as bars. Below this cosine of
+// the view to the vertical the strip is taken in parts; twice as flat, in full.
+const float FIELD_ALONG_COSINE = 0.12;
+const int FIELD_ALONG_PARTS = 4;
+
+// What a pixel sees of the layer over its strip. x: the thickness that lets as much through as the strip does on the whole; y: what light scattered once is of what that
+// thickness would make of it; z: mean thickness where there is cloud. mu_v: cosine of the view to the vertical; heading: of the view, any length; extinction_per_m: of the
+// light that is averaged.
+vec3 field_thickness_along(vec2 place, vec2 heading, float footprint, float mu_v, float extinction_per_m)
+{
+	// camera_footprint is as much longer than the pixel is wide as the strip is longer than it.
+	float flatness = 1.0 - smoothstep(0.5 * FIELD_ALONG_COSINE, FIELD_ALONG_COSINE, mu_v);
+	float strip = flatness * footprint * inversesqrt(mu_v);
+	vec2 part = heading * inversesqrt(max(dot(heading, heading), 1e-12)) * (strip / float(FIELD_ALONG_PARTS));
+	float octaves = field_octaves(max(footprint, strip / float(FIELD_ALONG_PARTS)));
+	float softness = field_softness(octaves);
+	float detail = cloud_detail.w * field_detail_sum(place - vec2(cloud_drift.x, cloud_drift.y), field_far_at(place, octaves), octaves);
+	vec4 thickness;
+	for (int i = 0; i < FIELD_ALONG_PARTS; i++) {
+		vec2 at = place + part * (float(i) - 0.5 * float(FIELD_ALONG_PARTS - 1));
+		thickness[i] = field_thickness_soft(field_far_at(at, octaves) + detail, softness);
+	}
+	vec4 depth = thickness * (extinction_per_m / mu_v);
+	float least = min(min(depth.x, depth.y), min(depth.z, depth.w));
+	vec4 seen = exp(vec4(least) - depth); // over that of the least
+	float sum = dot(seen, vec4(1.0));
+	float mean = least - log(sum / float(FIELD_ALONG_PARTS));
+	vec4 met = vec4(1.0) - exp(-depth);
+	return vec3(mean * mu_v / extinction_per_m, mean > 1e-4 ? min(dot(depth, seen) / (mean * sum), 1.0) : 1.0,
+	            dot(thickness, met) / max(dot(met, vec4(1.0)), 1e-6));
 }
 
 float field_thickness(vec2 place, float footprint)

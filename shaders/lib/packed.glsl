@@ -19,22 +19,36 @@ int packed_level(int side, ivec2 texel)
 	return level;
 }
 
-// Bilinear, of one level. uv: place in tiles.
-float packed_linear(sampler2D from, vec2 uv, int side, int level)
+// Texels a side of a level of so whole a number. By its bits, since software renderers shift lane by lane.
+float packed_size(int side, float level)
 {
-	int size = side >> level;
-	vec2 p = uv * float(size) - 0.5;
+	return float(side) * intBitsToFloat((127 - int(level)) << 23);
+}
+
+// A texel of the level of that size, at a place (its centre) in tiles from 0 to 1. Sampled without filter: software renderers fetch texels by number at twice the price.
+vec4 packed_texel(sampler2D from, vec2 place, int side, float size)
+{
+	float whole = float(side);
+	vec2 origin = size < whole ? vec2(whole, whole - 2.0 * size) : vec2(0.0);
+	return textureLod(from, (place * size + origin) * (vec2(2.0 / 3.0, 1.0) / whole), 0.0);
+}
+
+// Bilinear, of one level. uv: place in tiles.
+float packed_linear(sampler2D from, vec2 uv, int side, float level)
+{
+	float size = packed_size(side, level);
+	vec2 p = uv * size - 0.5;
 	vec2 base = floor(p);
 	vec2 f = p - base;
-	vec4 texel = texelFetch(from, (ivec2(base) & (size - 1)) + packed_origin(side, level), 0);
+	vec4 texel = packed_texel(from, fract((base + 0.5) / size), side, size);
 	return mix(mix(texel.x, texel.y, f.x), mix(texel.z, texel.w, f.x), f.y);
 }
 
-// Cubic B-spline, of one level.
-float packed_spline(sampler2D from, vec2 uv, int side, int level)
+// Cubic B-spline, of level 0.
+float packed_spline(sampler2D from, vec2 uv, int side)
 {
-	int size = side >> level;
-	vec2 p = uv * float(size) - 0.5;
+	float size = float(side);
+	vec2 p = uv * size - 0.5;
 	vec2 base = floor(p);
 	vec2 f = p - base;
 	vec2 f2 = f * f;
@@ -43,36 +57,22 @@ float packed_spline(sampler2D from, vec2 uv, int side, int level)
 	vec2 w1 = (2.0 / 3.0) - f2 + 0.5 * f3;
 	vec2 w2 = (1.0 / 6.0) + 0.5 * (f + f2 - f3);
 	vec2 w0 = 1.0 - w1 - w2 - w3;
-	ivec2 origin = packed_origin(side, level);
-	ivec2 low = ((ivec2(base) - 1) & (size - 1)) + origin;
-	ivec2 high = ((ivec2(base) + 1) & (size - 1)) + origin;
-	vec4 a = texelFetch(from, low, 0);
-	vec4 b = texelFetch(from, ivec2(high.x, low.y), 0);
-	vec4 c = texelFetch(from, ivec2(low.x, high.y), 0);
-	vec4 d = texelFetch(from, high, 0);
+	vec2 low = fract((base - 0.5) / size);
+	vec2 high = fract((base + 1.5) / size);
+	vec4 a = packed_texel(from, low, side, size);
+	vec4 b = packed_texel(from, vec2(high.x, low.y), side, size);
+	vec4 c = packed_texel(from, vec2(low.x, high.y), side, size);
+	vec4 d = packed_texel(from, high, side, size);
 	return w0.y * (w0.x * a.x + w1.x * a.y + w2.x * b.x + w3.x * b.y) + w1.y * (w0.x * a.z + w1.x * a.w + w2.x * b.z + w3.x * b.w) +
 	       w2.y * (w0.x * c.x + w1.x * c.y + w2.x * d.x + w3.x * d.y) + w3.y * (w0.x * c.z + w1.x * c.w + w2.x * d.z + w3.x * d.w);
 }
 
-// Levels of a footprint of 2^lod texels, and the share of the second.
-vec3 packed_levels(int side, float lod)
+// Between levels as a footprint of 2^lod texels says, each interpolated by itself.
+float packed_linear_between(sampler2D from, vec2 uv, int side, float lod)
 {
 	float last = log2(float(side));
 	float bounded = clamp(lod, 0.0, last);
 	float low = floor(bounded);
-	return vec3(low, min(low + 1.0, last), bounded - low);
-}
-
-// Between levels as the footprint says, each interpolated by itself.
-float packed_linear_between(sampler2D from, vec2 uv, int side, float lod)
-{
-	vec3 levels = packed_levels(side, lod);
-	return mix(packed_linear(from, uv, side, int(levels.x)), packed_linear(from, uv, side, int(levels.y)), levels.z);
-}
-
-float packed_spline_between(sampler2D from, vec2 uv, int side, float lod)
-{
-	vec3 levels = packed_levels(side, lod);
-	return mix(packed_spline(from, uv, side, int(levels.x)), packed_spline(from, uv, side, int(levels.y)), levels.z);
+	return mix(packed_linear(from, uv, side, low), packed_linear(from, uv, side, min(low + 1.0, last)), bounded - low);
 }
 #endif

@@ -3,46 +3,41 @@
 #define SHADERS_LIB_SCENE_BLOCK
 const int SEA_WAVES = 128;
 #ifndef __cplusplus
+#define SCENE_MEMBERS(M) \
+	M(sun_direction) M(sun_at_camera) M(solar_irradiance) M(rayleigh) M(aerosol) M(aerosol_shape) M(ozone) M(ground_albedo) M(ground_patch) \
+	M(ground_mean_albedo) M(camera_position) M(camera_right) M(camera_up) M(camera_forward) M(image_size) M(sun_disc_box) M(cloud_layer) \
+	M(cloud_field) M(cloud_drift) M(cloud_puffs) M(cloud_puffs_drift) M(cloud_detail) M(cloud_threshold) M(extinction) M(extinction_modified) M(extinction_scaled) \
+	M(slab_slice_range) M(slab_light) M(sky_irradiance_cloud) M(sky_irradiance_ground) M(air_below) M(air_around) M(band_red) M(band_green) \
+	M(band_blue) M(develop) M(sea_state)
+#define SCENE_BLOCK_MEMBER(name) vec4 name;
+#ifdef PASS_SOFTWARE
+// The vertices hand the block on as what is the same all over a triangle, which software renderers hold ready, while they would gather it out of the block lane by lane:
+// thirty instructions for each number at each pixel.
 layout(std140, binding = 0) uniform scene_block {
-	vec4 sun_direction;
-	vec4 sun_at_camera;
-	vec4 solar_irradiance;
-	vec4 rayleigh;
-	vec4 aerosol;
-	vec4 aerosol_shape;
-	vec4 ozone;
-	vec4 ground_albedo;
-	vec4 ground_patch;
-	vec4 ground_mean_albedo;
-	vec4 camera_position;
-	vec4 camera_right;
-	vec4 camera_up;
-	vec4 camera_forward;
-	vec4 image_size;
-	vec4 sun_disc_box;
-	vec4 cloud_layer;
-	vec4 cloud_field;
-	vec4 cloud_drift;
-	vec4 cloud_puffs;
-	vec4 cloud_puffs_drift;
-	vec4 cloud_detail;
-	vec4 cloud_threshold;
-	vec4 extinction;
-	vec4 extinction_modified;
-	vec4 extinction_scaled;
-	vec4 slab_slice_range;
-	vec4 slab_light;
-	vec4 sky_irradiance_cloud;
-	vec4 sky_irradiance_ground;
-	vec4 air_below;
-	vec4 air_around;
-	vec4 band_red;
-	vec4 band_green;
-	vec4 band_blue;
-	vec4 develop;
-	vec4 sea_state;
+	SCENE_MEMBERS(SCENE_BLOCK_MEMBER)
+	vec4 sea_waves[SEA_WAVES];
+} scene;
+#define sea_waves scene.sea_waves
+#ifdef PASS_VERTEX
+#define SCENE_HANDED_ON(name) flat out vec4 name;
+#define SCENE_HAND_ON(name) name = scene.name;
+#else
+#define SCENE_HANDED_ON(name) flat in vec4 name;
+#endif
+SCENE_MEMBERS(SCENE_HANDED_ON)
+#else
+#define SCENE_HAND_ON(name)
+layout(std140, binding = 0) uniform scene_block {
+	SCENE_MEMBERS(SCENE_BLOCK_MEMBER)
 	vec4 sea_waves[SEA_WAVES];
 };
+#endif
+#ifdef PASS_VERTEX
+void scene_hand_on()
+{
+	SCENE_MEMBERS(SCENE_HAND_ON)
+}
+#endif
 uniform vec4 arguments[4];
 #define INOUT(type) inout type
 #endif

@@ -165,6 +165,7 @@ struct view_point {
 	float mu_v_facet;
 	float lit;         // share of the beam that comes there past other clouds
 	float received;    // by light that is scattered often, relative to a flat top
+	float single;      // light scattered once, relative to that of the thickness alone
 };
 
 // cos_view: cosine of the viewing direction to the local vertical, positive upwards.
@@ -235,7 +236,7 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 #endif
 	sun *= mu_l / max(mu_l, 0.01);
 #if VIEW_SOLVED
-	vec3 first = facing * sun * solved_first(p.half_angle, vec3(extinction_scaled) * thickness, m_l, m_v, through);
+	vec3 first = p.single * facing * sun * solved_first(p.half_angle, vec3(extinction_scaled) * thickness, m_l, m_v, through);
 	vec3 rest = received * sun * solved_multiple(base ? slab_light.x : 0.0, p.smooth_thickness, vec3(extinction_scaled) * (p.way * p.mu_v),
 	                                             max(mu_l, 0.01), p.mu_v, p.view_index, p.cos_azimuth);
 #if VIEW_COLOR_ONLY
@@ -289,13 +290,14 @@ void view_layer_diffuse(view_point p, vec3 sky, vec3 ground, INOUT(view_parts) p
 	parts.optical_thickness = extinction.y * p.thickness;
 }
 
-view_point view_point_at(vec3 direction, float thickness, float smooth_thickness, float cos_view, float mu_sun)
+// inside: thickness where there is cloud in the pixel.
+view_point view_point_at(vec3 direction, float thickness, float inside, float smooth_thickness, float cos_view, float mu_sun)
 {
 	view_point p;
 	p.thickness = thickness;
 	// The more often light is scattered on its way, the more of it has come from the side.
-	float spread = VIEW_SOLVED > 0 ? slab_light.w * thickness : 0.0;
-	p.smooth_thickness = mix(thickness, smooth_thickness, spread / (1.0 + spread));
+	float spread = VIEW_SOLVED > 0 ? slab_light.w * inside : 0.0;
+	p.smooth_thickness = mix(inside, smooth_thickness, spread / (1.0 + spread));
 	p.mu_v = max(abs(cos_view), 0.01);
 	p.view_index = slab_view_index(p.mu_v);
 	p.mu_sun = mu_sun;
@@ -306,6 +308,7 @@ view_point view_point_at(vec3 direction, float thickness, float smooth_thickness
 	p.mu_v_facet = p.mu_v;
 	p.lit = 1.0;
 	p.received = 1.0;
+	p.single = 1.0;
 	return p;
 }
 #endif
@@ -349,7 +352,16 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
 	float footprint = camera_footprint(t, cos_view);
-	view_point p = view_point_at(direction, view_thickness(place, footprint), height_smooth(place, footprint), cos_view, view_sun_cosine(direction, t, base));
+	vec3 layer = vec3(0.0, 1.0, 0.0);
+#if VIEW_PROJECTION != 1
+	// A fisheye's footprint is as long as the strip.
+	if (cos_view < FIELD_ALONG_COSINE && cloud_layer.w > 0.5)
+		layer = field_thickness_along(place, vec2(direction), footprint, cos_view, extinction_scaled.y);
+	else
+#endif
+		layer.x = layer.z = view_thickness(place, footprint);
+	view_point p = view_point_at(direction, layer.x, layer.z, height_smooth(place, footprint), cos_view, view_sun_cosine(direction, t, base));
+	p.single = layer.y;
 
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
 	view_layer_sunlight(p, vec3(textureLod(air_to_end, air, 0.0)) * float(p.thickness > 0.01), parts);
@@ -384,7 +396,7 @@ void view_cloud_top(vec3 direction, vec4 place, vec4 light, vec2 air, INOUT(view
 	float height = max(sphere_height(camera_position.z, direction.z, t), cloud_layer.x);
 	float mu_sun = view_sun_cosine(direction, t, height);
 	float cos_view = min(sphere_cosine(camera_position.z, direction.z, t, height), -0.01);
-	view_point p = view_point_at(direction, place.z, place.w, cos_view, mu_sun);
+	view_point p = view_point_at(direction, place.z, place.z, place.w, cos_view, mu_sun);
 	vec3 normal = normalize(vec3(-light.x, -light.y, 1.0));
 	p.way = place.y;
 	// The vertical turns with the distance: facets are taken against the local one.

@@ -150,15 +150,20 @@ vec3 up_single(vec3 tau, float mu_l, float mu_v, vec3 along_light, vec3 along_vi
 	return tau / mu_v * mix(exact, series, lessThan(x, vec3(0.01)));
 }
 
-// Thickness evened out over the way that light goes sideways, m.
-float up_smooth_thickness(vec2 place, float footprint)
+// Thickness evened out over the way that light goes sideways, m. octaves: by which the footprint is larger than a texel of it.
+float up_smooth_thickness_at(vec2 place, float octaves)
 {
 	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
 #ifdef FIELD_NEAR
-	return packed_linear(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), 0);
+	return packed_linear(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), 0.0);
 #else
-	return packed_linear_between(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), log2(footprint * HEIGHT_SIZE_SMOOTH / cloud_layer.z));
+	return packed_linear_between(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), octaves);
 #endif
+}
+
+float up_smooth_thickness(vec2 place, float footprint)
+{
+	return up_smooth_thickness_at(place, log2(footprint * HEIGHT_SIZE_SMOOTH / cloud_layer.z));
 }
 
 // What arrives along a ray that meets the layer from below, W/m2/nm/sr. disc: radiance of the sun's disc in the pixel (shaders/lib/sun_disc.glsl).
@@ -167,9 +172,20 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 air = sky_table_coordinates(direction);
 	vec2 unit = up_unit(air);
 	up_ray ray = up_ray_of(direction);
+#ifdef FIELD_ALONG
+	vec3 layer = field_thickness_along(ray.place, vec2(direction), ray.footprint, ray.mu_v, extinction_scaled.y);
+#if FIELD_ALONG == 2
+	if (ray.mu_v >= FIELD_ALONG_COSINE)
+		layer = vec3(1.0, 0.0, 1.0) * field_thickness(ray.place, ray.footprint) + vec3(0.0, 1.0, 0.0);
+#endif
+	float thickness = layer.x;
+	float inside = layer.z;
+#else
 	float thickness = field_thickness(ray.place, ray.footprint);
-	float spread = slab_light.w * thickness;
-	float smooth_thickness = mix(thickness, up_smooth_thickness(ray.place, ray.footprint), spread / (1.0 + spread));
+	float inside = thickness;
+#endif
+	float spread = slab_light.w * inside;
+	float smooth_thickness = mix(inside, up_smooth_thickness(ray.place, ray.footprint), spread / (1.0 + spread));
 	float depth_unit = up_depth_unit(smooth_thickness);
 
 	vec4 sky = textureLod(up_sky, air, 0.0);
@@ -183,6 +199,9 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 half_angle = scattering_half_angle(-vec3(sun_direction), -direction);
 	vec3 first = up_first_at(half_angle, solved_mean_depth(tau.y / ray.mu_l, tau.y / ray.mu_v)) *
 	             up_single(tau, ray.mu_l, ray.mu_v, along_light, along_view);
+#ifdef FIELD_ALONG
+	first *= layer.y;
+#endif
 	vec4 light = up_light_at(unit, depth_unit);
 	vec3 received = vec3(textureLod(cloud_received, ray.place / cloud_layer.z, 0.0));
 	vec3 diffuse = to_layer * (vec3(sky_irradiance_cloud) * light.w + received * (1.0 - light.w)) * (1.0 / PI);

@@ -5,7 +5,9 @@ uniform sampler2D picture;
 
 void pass(ivec2 pixel)
 {
-	vec3 rgb = colour_into_gamut(vec3(texelFetch(picture, pixel, 0))) * exp2(develop.y);
+	// Sampled, unfiltered: software renderers fetch texels by number at twice the price.
+	vec4 texel = textureLod(picture, (vec2(pixel) + 0.5) / vec2(textureSize(picture, 0)), 0.0);
+	vec3 rgb = colour_into_gamut(vec3(texel)) * exp2(develop.y);
 	if (develop.z < 0.5) {
 		rgb = colour_bleach(rgb * COLOUR_FILM_BALANCE);
 		rgb = vec3(colour_filmic(rgb.x), colour_filmic(rgb.y), colour_filmic(rgb.z));

@@ -152,7 +152,7 @@ static pipeline shared;
 
 static void start(pass_kind kind)
 {
-	const pass_compiler compiler = {kind, nullptr};
+	const pass_compiler compiler = {kind, nullptr, false};
 	shared.context.cache = cache_create(256u << 20);
 	shared.context.droplets = shared.store;
 	glCreateBuffers(1, &shared.context.block_buffer);

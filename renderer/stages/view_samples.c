@@ -5,9 +5,10 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Angles between rays, rad. Panoramas are for measuring: theirs, and what their rays cover, are such that the light of broken clouds is
- * right within a percent (tests/unit/test_renderer_panoramas.c). Perspectives are for looking. */
-static const double panorama_angle = 0.0041, panorama_footprint = 0.002, perspective_angle = 0.0062;
+/* Largest angle between rays, rad, and what one of them covers at most: with these the light of broken clouds is right within a percent
+ * (tests/unit/test_renderer_panoramas.c). Pixels that are hardly smaller want two rays a side all the same, lest they show single places.
+ */
+static const double ray_angle = 0.0062, ray_footprint = 0.002, fine_angle = 0.0041;
 /* Pictures are made no finer than of so many rays. */
 static const double rays_max = 1 << 22;
 
@@ -24,10 +25,11 @@ void view_samples_finish(struct view_samples_stage *stage)
 struct view_samples view_samples_of(const struct scene *scene)
 {
 	const struct camera_view view = camera_view_of(scene, 0);
-	const bool panorama = scene->camera.projection != PROJECTION_PERSPECTIVE;
 	const double angle = camera_pixel_angle(&view), most = floor(sqrt(rays_max / scene->output.width / scene->output.height));
-	const double per_side = fmax(1, fmin(ceil(angle / (panorama ? panorama_angle : perspective_angle)), most));
-	return (struct view_samples){(int)per_side, panorama ? fmin(1, panorama_footprint * per_side / angle) : 1};
+	if (scene->camera.projection == PROJECTION_PERSPECTIVE)
+		return (struct view_samples){1, 1};
+	const double per_side = fmax(1, fmin(fmax(ceil(angle / ray_angle), angle > fine_angle ? 2 : 1), most));
+	return (struct view_samples){(int)per_side, fmin(1, ray_footprint * per_side / angle)};
 }
 
 static const struct pass *pass_of(struct view_samples_stage *stage, enum projection projection)

@@ -25,7 +25,7 @@ struct view_samples {
 	double footprint; /* what of its share of the pixel a ray covers, 0..1 of a side */
 };
 
-/* Of a picture of clouds from below. */
+/* Of a picture of clouds from below. Perspectives, which are for looking, have one ray a pixel. */
 struct view_samples view_samples_of(const struct scene *scene);
 
 /* Averages the rows of one view of `fine`, which has so many rays a side of a pixel, into `picture`. Weights are solid angles, so that

@@ -20,14 +20,15 @@ static const double fall = 1.5;
 /* Steepest rise that is stored, full ranges a texel. As in shaders/lib/height_detail.glsl. */
 static const float steepest = 0.25f;
 
-/* Size of the largest puffs and how far all of them together bulge from crease to top, m; speed at which they well up, m/s. */
+/* Size of the largest puffs and how far all of them together bulge from crease to top, m; speed at which they well up, m/s; most that they
+ * bulge, over the thickness: on a thin even sheet nothing stirs. */
 static const struct {
-	double length, height, speed;
+	double length, height, speed, share;
 } kinds[CLOUD_TYPE_COUNT] = {
-	[CLOUD_STRATUS] = {110, 10, 0.2},
-	[CLOUD_STRATOCUMULUS] = {100, 75, 0.7},
-	[CLOUD_ALTOCUMULUS] = {60, 30, 0.4},
-	[CLOUD_CIRROCUMULUS] = {40, 16, 0.3},
+	[CLOUD_STRATUS] = {240, 6, 0.2, 0.015},
+	[CLOUD_STRATOCUMULUS] = {100, 75, 0.7, 0.4},
+	[CLOUD_ALTOCUMULUS] = {60, 30, 0.4, 0.4},
+	[CLOUD_CIRROCUMULUS] = {40, 16, 0.3, 0.4},
 };
 
 /* Tile for which the lengths are; on larger ones puffs begin at what the height field's larger texels leave out. */
@@ -65,9 +66,10 @@ void height_puffs_fill_block(struct scene_block *block, const struct scene_cloud
 	const double larger = enlargement(clouds), length = kinds[clouds->type].length * larger * periods[0][0];
 	/* As many times as fit: the volume repeats with the tile of the field. */
 	const double tile = length > 0 ? clouds->tile_m / fmax(1, round(clouds->tile_m / length)) : 1, depth = tile * DEPTH / SIDE;
-	const double height =
-		octaves > 0 ? fmin(kinds[clouds->type].height * pow(larger, roughness), (octaves > 1 ? 0.6 : 0.4) * clouds->thickness_m)
-			    : 0;
+	/* On larger ones smaller ones stand. */
+	const double bulge = kinds[clouds->type].height * pow(larger, roughness);
+	const double share = octaves > 1 ? 1.5 * kinds[clouds->type].share : kinds[clouds->type].share;
+	const double height = octaves > 0 ? fmin(bulge, share * clouds->thickness_m) : 0;
 	const double risen = kinds[clouds->type].speed * clouds->time_s / depth;
 	block->cloud_puffs[0] = (float)height;
 	block->cloud_puffs[1] = (float)tile;

@@ -35,7 +35,7 @@ height_surface height_surface_at(vec3 direction, float t)
 	height += scale * puff.x;
 	// Of the light that is scattered often, creases get less, and slopes as they face the sun.
 	float facing = 1.0 - 0.3 * dot(slope, height_sun_heading()) / max(height_sun_rise(), 0.3);
-	received *= clamp(facing, 0.6, 1.5) * (1.0 + 0.5 * puff.x);
+	received *= clamp(facing, 0.6, 1.5) * (1.0 + 0.75 * puff.x * scale / (scale + 30.0));
 #endif
 	height_surface at;
 	at.place = vec4(t, 0.0, height, height_smooth(place, footprint));

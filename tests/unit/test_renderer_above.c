@@ -124,7 +124,8 @@ static void gaps_are_darker_at_twilight(void **state)
 			counts[gap]++;
 		}
 	const double cloud = sums[0] / fmax(counts[0], 1), gap = sums[1] / fmax(counts[1], 1);
-	print_message("sun at -4 deg, seen towards it: %d pixels of gaps have %.2f of the luminance of %d of cloud\n", counts[1], gap / cloud, counts[0]);
+	print_message("sun at -4 deg, seen towards it: %d pixels of gaps have %.2f of the luminance of %d of cloud\n", counts[1],
+		      gap / cloud, counts[0]);
 	assert_true(counts[0] > 200 && counts[1] > 200 && gap < 0.98 * cloud);
 	frame_finish(&frame);
 }

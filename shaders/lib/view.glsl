@@ -78,12 +78,14 @@ struct view_lit {
 	vec3 reflectance;
 };
 
-void view_add_lit(vec2 place, vec2 ragged, float footprint, vec3 sun, float share, INOUT(view_lit) lit)
+// lit_painted: the place that light comes to, and the one whose paint shows there.
+void view_add_lit(vec4 lit_painted, float footprint, vec3 sun, float share, INOUT(view_lit) lit)
 {
 	vec3 received = vec3(sky_irradiance_ground);
 	vec3 beam = sun;
 #if VIEW_CLOUDS
 	{
+		vec2 place = vec2(lit_painted);
 		received = vec3(textureLod(ground_received, place / cloud_layer.z, 0.0));
 		// The beam passed the layer where the parallax says; its shadow is as soft as the sun is wide.
 		vec2 through = place + vec2(sun_direction) * cloud_layer.x / max(sun_direction.z, 0.02);
@@ -94,9 +96,9 @@ void view_add_lit(vec2 place, vec2 ragged, float footprint, vec3 sun, float shar
 	lit.beam += share * beam;
 	lit.received += share * received;
 #if VIEW_GROUND == 3
-	lit.reflectance += share * ground_ice(ground_reflectance(place + ragged, footprint), footprint);
+	lit.reflectance += share * ground_ice(ground_reflectance(vec2(lit_painted.z, lit_painted.w), footprint), footprint);
 #elif VIEW_GROUND != 2
-	lit.reflectance += share * ground_reflectance(place, footprint);
+	lit.reflectance += share * ground_reflectance(vec2(lit_painted.z, lit_painted.w), footprint);
 #endif
 }
 
@@ -123,7 +125,8 @@ vec3 view_ground(vec3 direction, float high, ground_point point)
 #if VIEW_GROUND == 3
 	ragged = ground_ragged(point);
 #endif
-	view_lit lit = view_lit(vec3(0.0), vec3(0.0), vec3(0.0));
+	view_lit lit;
+	lit.beam = lit.received = lit.reflectance = vec3(0.0);
 #if VIEW_REGION == 0
 	int places = direction.z > sphere_horizon(camera_position.z) - VIEW_STRIP_ROWS * camera_position.w ? VIEW_STRIP_PLACES : 1;
 	for (int i = 0; i < places; i++) {
@@ -132,10 +135,10 @@ vec3 view_ground(vec3 direction, float high, ground_point point)
 		float mu_v = places > 1 ? max(-sphere_cosine(camera_position.z, z, t, 0.0), 0.002) : point.mu_v;
 		vec2 there = places > 1 ? vec2(camera_position) + vec2(direction) * t : place;
 		float across = places > 1 ? camera_position.w * t : point.across;
-		view_add_lit(there, ragged, view_ground_footprint(across, mu_v), sun, 1.0 / float(places), lit);
+		view_add_lit(vec4(there, there + ragged), view_ground_footprint(across, mu_v), sun, 1.0 / float(places), lit);
 	}
 #else
-	view_add_lit(place, ragged, view_ground_footprint(point.across, point.mu_v), sun, 1.0, lit);
+	view_add_lit(vec4(place, place + ragged), view_ground_footprint(point.across, point.mu_v), sun, 1.0, lit);
 #endif
 #if VIEW_GROUND == 2
 	vec2 heading = -point.offset * inversesqrt(max(dot(point.offset, point.offset), 1e-8));

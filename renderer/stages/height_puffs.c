@@ -25,7 +25,7 @@ static const float steepest = 0.25f;
 static const struct {
 	double length, height, speed, share;
 } kinds[CLOUD_TYPE_COUNT] = {
-	[CLOUD_STRATUS] = {240, 6, 0.2, 0.015},
+	[CLOUD_STRATUS] = {110, 8, 0.2, 0.015},
 	[CLOUD_STRATOCUMULUS] = {100, 75, 0.7, 0.4},
 	[CLOUD_ALTOCUMULUS] = {60, 30, 0.4, 0.4},
 	[CLOUD_CIRROCUMULUS] = {40, 16, 0.3, 0.4},

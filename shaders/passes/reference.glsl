@@ -448,6 +448,9 @@ void pass(ivec2 pixel)
 		if (path.mode == PATH_LEAVES)
 			reference_leave(path, sums, disc);
 		if (path.mode == PATH_DONE) {
+			// Weights of ways to a sun at the horizon can leave the range of numbers.
+			if (!(abs(sums.light.x) + abs(sums.light.y) + abs(sums.light.z) < 1e12))
+				sums.light = sums.certain;
 			vec3 rgb = colour_of_bands(sums.light);
 			sums.color += rgb;
 			rgb = colour_of_bands(sums.light - sums.certain);

@@ -58,6 +58,8 @@ struct light_path {
 	float weight;  // of the way up to there, as path_sun_weight counts it
 	float reach;   // m, up to the end of the layer
 	int cloudy;    // parts of that way that are expected to lie in cloud, as a bit set
+	vec2 looked;   // scales of the shares of forward scatterings that are looked for in those parts and elsewhere
+	float mean;    // number of forward scatterings that is looked for
 	int left;      // scatterings to come
 	ivec2 chain;
 	vec2 turn;     // cosine and sine of the angle by which the chain is turned about the sun

@@ -21,6 +21,9 @@ const float PATH_PARTS_BEND = 12.0;
 // Where no cloud is expected there may be some: share of the forward scatterings looked for beside cloud, and away from it.
 const float PATH_BESIDE = 0.4;
 const float PATH_AWAY = 0.15;
+const float PATH_IN_VAIN = 1.5;
+const float PATH_SURE = 4.0; // optical thickness
+const float PATH_MOST = 6.0;
 
 // Where a part begins, over the whole way; and the part at a place.
 float path_part_start(int part)
@@ -39,10 +42,17 @@ bool path_part_cloudy(int cloudy, int part)
 	return ((cloudy >> part) & 1) != 0;
 }
 
-// Share of the forward scatterings in cloud that are looked for in a part.
-float path_part_share(int cloudy, int part)
+// Is it so short that it lies in cloud as a whole, where its middle does? Only then cloud is counted on.
+bool path_part_sure(light_path path, int part)
 {
-	return path_part_cloudy(cloudy, part) ? 1.0 : (((cloudy << 1) >> part) & 5) != 0 ? PATH_BESIDE : PATH_AWAY;
+	float size = (path_part_start(part + 1) - path_part_start(part)) * path.reach;
+	return path_part_cloudy(path.cloudy, part) && size * extinction.y < PATH_SURE;
+}
+
+// Share of the forward scatterings in cloud that are looked for in a part.
+float path_part_share(int cloudy, vec2 looked, int part)
+{
+	return path_part_cloudy(cloudy, part) ? looked.x : looked.y * ((((cloudy << 1) >> part) & 5) != 0 ? PATH_BESIDE : PATH_AWAY);
 }
 
 // Draws where the path is scattered next: x of a uniform density over the rest of the ways as they are weighed.
@@ -55,7 +65,7 @@ void path_sun_draw_next(INOUT(light_path) path, float whole)
 	for (int i = 0; i < PATH_PARTS; i++) {
 		float from = path_part_start(i);
 		float size = path_part_start(i + 1) - from;
-		float part_share = path_part_share(path.cloudy, i);
+		float part_share = path_part_share(path.cloudy, path.looked, i);
 		at = at < 0.0 && rest <= size * part_share ? from + rest / part_share : at;
 		rest -= size * part_share;
 	}
@@ -63,11 +73,11 @@ void path_sun_draw_next(INOUT(light_path) path, float whole)
 }
 
 // The whole way, weighed, over its length.
-float path_sun_whole(int cloudy)
+float path_sun_whole(int cloudy, vec2 looked)
 {
 	float sum = 0.0;
 	for (int i = 0; i < PATH_PARTS; i++)
-		sum += (path_part_start(i + 1) - path_part_start(i)) * path_part_share(cloudy, i);
+		sum += (path_part_start(i + 1) - path_part_start(i)) * path_part_share(cloudy, looked, i);
 	return sum;
 }
 
@@ -100,14 +110,17 @@ float path_sun_reach(float height, float mu_sun)
 	return max(mu < 0.0 ? (cloud_layer.x - height) / mu : (cloud_layer.x + cloud_layer.y - height) / mu, 0.01);
 }
 
-// Looks at the straight way from a place to the sun: which parts of it lie in cloud.
-int path_sun_look(vec3 place, float height, float mu_sun, float reach)
+// Looks at the straight way from a place to the sun: which parts of it lie in cloud, as far as light comes through. furthest: m of cloud.
+int path_sun_look(vec3 place, float height, float mu_sun, float reach, float furthest)
 {
 	int cloudy = 0;
+	float passed = 0.0;
 	for (int i = 0; i < PATH_PARTS; i++) {
 		float t = 0.5 * (path_part_start(i) + path_part_start(i + 1)) * reach;
 		float over = height - cloud_layer.x + mu_sun * t;
-		cloudy |= over >= 0.0 && over < path_top(place + vec3(sun_direction) * t) ? 1 << i : 0;
+		bool inside = passed < furthest && over >= 0.0 && over < path_top(place + vec3(sun_direction) * t);
+		cloudy |= inside ? 1 << i : 0;
+		passed += inside ? (path_part_start(i + 1) - path_part_start(i)) * reach : 0.0;
 	}
 	return cloudy;
 }
@@ -120,51 +133,51 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 	vec3 peak = vec3(extinction) - vec3(extinction_modified);
 	float hero_peak = path_of_hero(peak, path.hero);
 	path.reach = path_sun_reach(height, mu_sun);
-	path.cloudy = path_sun_look(place, height, mu_sun, path.reach);
+	path.cloudy = path_sun_look(place, height, mu_sun, path.reach, PATH_MOST / hero_peak);
 	path.arc = 0.0;
 	path.weight = 0.0;
-	float expected = 0.0;
-	for (int i = 0; i < PATH_PARTS; i++)
-		expected += path_part_cloudy(path.cloudy, i) ? (path_part_start(i + 1) - path_part_start(i)) * path.reach : 0.0;
-	float whole = path_sun_whole(path.cloudy);
+	float expected = path_sun_whole(path.cloudy, vec2(1.0, 0.0)) * path.reach;
+	// Long ways to a low sun lie in the open, or lead through so much cloud that light takes another: no more scatterings are looked for there than light makes.
+	float in_vain = path_sun_whole(path.cloudy, vec2(0.0, 1.0)) * path.reach;
+	path.looked = min(vec2(1.0), vec2(2.0 * PATH_MOST, PATH_IN_VAIN) / max(hero_peak * vec2(expected, in_vain), vec2(1e-6)));
+	float whole = path_sun_whole(path.cloudy, path.looked);
 
-	float patience = clamp(4.0 * exp(-path_of_hero(vec3(extinction_modified), path.hero) * expected), 0.03, 1.0);
+	float patience = clamp(4.0 * exp(-path_of_hero(vec3(extinction_modified), path.hero) * expected * min(10.0 * abs(mu_sun), 1.0)), 0.03, 1.0);
 	bool looks = path_random(path) < patience;
 	// Poisson's law by inversion.
 	float way = whole * path.reach;
-	float mean = hero_peak * way;
-	float term = exp(-mean);
+	path.mean = hero_peak * way;
+	float term = exp(-path.mean);
 	float sum = term;
 	float share = path_random(path);
 	int count = 0;
 	for (int i = 1; i <= PATH_CHAIN_LENGTH; i++) {
 		if (share > sum) {
 			count = i;
-			term *= mean / float(i);
+			term *= path.mean / float(i);
 			sum += term;
 		}
 	}
 	path.left = min(count, PATH_CHAIN_LENGTH - 1);
-	uint which = uint(path_random(path) * 4096.0);
+	uint which = min(uint(path_random(path) * 4096.0), 4095u);
 	float around = 2.0 * PI * path_random(path);
 	path.chain = ivec2(int(which & 63u) * PATH_CHAIN_LENGTH, int(which >> 6u) + PATH_CHAIN_ROWS * path.hero);
 	path.turn = vec2(cos(around), sin(around));
 	vec4 texel = path_sun_texel(path);
 	path.direction = path_sun_direction(path, texel);
 	// More forward scatterings than a chain holds are left out: a share of 1e-5 of what gets through so much cloud at all.
-	vec3 lets = exp(vec3(mean) - vec3(extinction) * expected) / patience;
 	vec3 densities = path_sun_ratio(path, texel) * exp((vec3(hero_peak) - peak) * way);
 	path_sun_draw_next(path, whole);
-	// The way's own density stands in path_weight as exp(-peak way), of which `lets` holds the hero's inverse.
+	// Densities are over the hero's, whose own exp(-mean) stands in path_sun_arrives.
 	vec3 own = path_sun_ratio(path, texel);
 	vec3 weight = path.share * path.ratio * own / max(dot(PATH_HERO_SHARE, path.ratio * densities), 1e-30);
-	return looks && count < PATH_CHAIN_LENGTH ? weight * lets : vec3(0.0);
+	return looks && count < PATH_CHAIN_LENGTH ? weight / patience : vec3(0.0);
 }
 
 // A free path of the search ends inside the cloud or outside of it. false when nothing is left.
 bool path_sun_collides(INOUT(light_path) path, bool inside, float largest)
 {
-	bool expected = path_part_cloudy(path.cloudy, path_part_at(path.arc / path.reach));
+	bool expected = path_part_sure(path, path_part_at(path.arc / path.reach));
 	vec3 factor = vec3(1.0) - vec3(extinction) * ((inside ? 1.0 : 0.0) - (expected ? 1.0 : 0.0)) / largest;
 	// Where cloud is unexpected hardly anything is left.
 	float most = clamp(max(factor.x, max(factor.y, factor.z)), 0.0, 1.0);
@@ -172,13 +185,23 @@ bool path_sun_collides(INOUT(light_path) path, bool inside, float largest)
 	return path_random(path) < most;
 }
 
+// Out of the layer: what is left of path.sun. Cloud as it was expected on the way so far; path_sun_collides has weighed what else there was.
+vec3 path_sun_arrives(light_path path)
+{
+	float way = path.arc / path.reach;
+	float expected = 0.0;
+	for (int i = 0; i < PATH_PARTS; i++)
+		expected += path_part_sure(path, i) ? clamp(way - path_part_start(i), 0.0, path_part_start(i + 1) - path_part_start(i)) : 0.0;
+	return path.left == 0 ? path.sun * exp(vec3(path.mean) - vec3(extinction) * (expected * path.reach)) : vec3(0.0);
+}
+
 // The next forward scattering, in cloud.
 void path_sun_turns(INOUT(light_path) path)
 {
-	path.sun /= path_part_share(path.cloudy, path_part_at(path.arc / path.reach));
+	path.sun /= path_part_share(path.cloudy, path.looked, path_part_at(path.arc / path.reach));
 	path.left = max(path.left - 1, 0);
 	path.direction = path_sun_direction(path, path_sun_texel(path));
-	path_sun_draw_next(path, path_sun_whole(path.cloudy));
+	path_sun_draw_next(path, path_sun_whole(path.cloudy, path.looked));
 	path.mode = PATH_SUN;
 }
 #endif

@@ -141,6 +141,8 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.arc = 0.0;
 	path.reach = 1.0;
 	path.cloudy = 0;
+	path.looked = vec2(1.0);
+	path.mean = 0.0;
 	sums.light = vec3(0.0);
 	sums.certain = vec3(0.0);
 	float h = camera_position.z;
@@ -389,7 +391,7 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 	bool inside = height >= 0.0 && height < path.top;
 	if (height < 0.0 || height > cloud_layer.y) {
 		if (searches) {
-			reference_add(sums, path.kind, path.left == 0 ? path.sun : vec3(0.0));
+			reference_add(sums, path.kind, path_sun_arrives(path));
 			reference_resume(path);
 		} else {
 			path.mode = PATH_LEAVES;
@@ -446,6 +448,9 @@ void pass(ivec2 pixel)
 		if (path.mode == PATH_LEAVES)
 			reference_leave(path, sums, disc);
 		if (path.mode == PATH_DONE) {
+			// Weights of ways to a sun at the horizon can leave the range of numbers.
+			if (!(abs(sums.light.x) + abs(sums.light.y) + abs(sums.light.z) < 1e12))
+				sums.light = sums.certain;
 			vec3 rgb = colour_of_bands(sums.light);
 			sums.color += rgb;
 			rgb = colour_of_bands(sums.light - sums.certain);

@@ -63,7 +63,7 @@ static void fill_block(struct uniform_layer *layer)
 	}
 	block->band_red[0] = block->band_green[1] = block->band_blue[2] = 1; /* colors are bands */
 	block->cloud_layer[0] = BASE_M;
-	block->cloud_layer[1] = (float)layer->is.thickness_m * 1.25f;
+	block->cloud_layer[1] = (float)layer->is.thickness_m;
 	block->cloud_layer[2] = 10000;
 	block->cloud_layer[3] = 1;
 	block->ground_patch[0] = block->ground_patch[3] = 1;

@@ -176,7 +176,8 @@ static enum MHD_Result finish(struct request *request)
 	set_samples(response, &work->job.frame);
 	enum MHD_Result result = send_image(request, MHD_HTTP_OK, response);
 	metrics_count_timings(request->service->metrics, &request->timings);
-	metrics_count_picture(request->service->metrics, (double)work->job.frame.width * work->job.frame.height * work->job.frame.layer_count);
+	metrics_count_picture(request->service->metrics,
+			      (double)work->job.frame.width * work->job.frame.height * work->job.frame.layer_count);
 	return result;
 }
 

@@ -114,8 +114,11 @@ static void render_by_shader(struct pipeline *pipeline, const struct scene *scen
 	const struct texture *textures[2 + LAYERS];
 	struct reference_result result;
 	const struct reference_inputs inputs = {&pipeline->view, pipeline->at_layer.total, pipeline->at_ground.total};
-	assert_true(reference_stage_run(&pipeline->reference, &pipeline->context, scene, &inputs, wanted, 2 + LAYERS, NULL, NULL, textures,
-					&result));
+	const struct reference_watch nobody = {0};
+	struct reference_work *work = NULL;
+	assert_true(reference_stage_run(&pipeline->reference, &pipeline->context, scene, &inputs, wanted, 2 + LAYERS, &nobody, &work,
+					textures, &result));
+	assert_null(work);
 	assert_int_equal(result.samples, scene->model.samples);
 	for (int i = 0; i < 2 + LAYERS; i++)
 		stage_read_texture(textures[i], 0, 4, picture->layer[i]);

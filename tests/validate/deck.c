@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PICTURE_SIDE = 16, LAYERS = 9, VIEW_NODES = 12, AZIMUTHS = 12, FACE_SIDE = 48, FACES = 6 };
+enum { PICTURE_SIDE = 16, LAYERS = 9, VIEW_NODES = 12, AZIMUTHS = 12, FACE_SIDE = 48, FACES = 5 };
 
 #define DEGREE (M_PI / 180)
 
@@ -336,24 +336,40 @@ bool deck_measure_leaving(struct deck *deck, const struct scene *scene, double l
 	return true;
 }
 
-/* Irradiance of a horizontal plane from below by what the pictures of a cubemap show. */
-static void flux_of(const struct scene *scene, const struct texture *picture, double flux[BAND_COUNT])
+/* Adds to the irradiance of a horizontal plane from below, in colour, what a picture shows. */
+static void add_flux(const struct scene *scene, const struct texture *picture, double rgb[3])
 {
-	static float texels[FACES * FACE_SIDE * FACE_SIDE][4];
-	double rgb[3] = {0};
+	static float texels[FACE_SIDE * FACE_SIDE][4];
+	const struct camera_view view = camera_view_of(scene, 0);
 	stage_read_texture(picture, 0, 4, &texels[0][0]);
-	for (int face = 0; face < FACES; face++) {
-		const struct camera_view view = camera_view_of(scene, face);
-		for (int i = 0; i < FACE_SIDE * FACE_SIDE; i++) {
-			const int column = i % FACE_SIDE, row = view.first_row + i / FACE_SIDE;
-			double direction[3];
-			camera_direction(&view, (double[]){column + 0.5, row + 0.5}, direction);
-			const double weight = fmax(0, -direction[2]) * camera_pixel_solid_angle(&view, column, row);
-			for (int channel = 0; channel < 3; channel++)
-				rgb[channel] += weight * (double)texels[face * FACE_SIDE * FACE_SIDE + i][channel];
-		}
+	for (int i = 0; i < FACE_SIDE * FACE_SIDE; i++) {
+		const int column = i % FACE_SIDE, row = i / FACE_SIDE;
+		double direction[3];
+		camera_direction(&view, (double[]){column + 0.5, row + 0.5}, direction);
+		const double weight = fmax(0, -direction[2]) * camera_pixel_solid_angle(&view, column, row);
+		for (int channel = 0; channel < 3; channel++)
+			rgb[channel] += weight * (double)texels[i][channel];
 	}
-	bands_of(rgb, flux);
+}
+
+/* One side of a cube round the camera: down, and to the four sides. */
+static bool look_at_face(struct deck *deck, struct scene scene, int face, enum layer layer, double rgb[3])
+{
+	const struct texture *picture;
+	struct made made;
+	scene.camera.elevation_deg = face == 0 ? -90 : 0;
+	scene.camera.azimuth_deg = 90 * (face % 4);
+	scene.camera.vertical_fov_deg = 90;
+	bool ok = make(deck, &scene, &made);
+	if (ok) {
+		const struct view_inputs inputs = inputs_of(&made);
+		stage_upload_block(&deck->context);
+		ok = view_stage_run(&deck->view, &deck->context, &scene, &inputs, &layer, 1, NULL, NULL, &picture);
+	}
+	if (ok)
+		add_flux(&scene, picture, rgb);
+	droplets_release(&deck->context);
+	return ok;
 }
 
 /* What comes up at a height, in one layer, as the mean over so many places. */
@@ -361,33 +377,20 @@ static bool look_down_around(struct deck *deck, const struct scene *scene, doubl
 			     double flux[BAND_COUNT])
 {
 	struct scene there = *scene;
-	there.camera.projection = PROJECTION_CUBEMAP;
-	there.camera.face = FACE_ALL;
+	double rgb[3] = {0};
 	there.camera.position_m[2] = height;
-	there.output.width = FACE_SIDE;
-	there.output.height = FACES * FACE_SIDE;
-	memset(flux, 0, BAND_COUNT * sizeof *flux);
+	there.output.width = there.output.height = FACE_SIDE;
 	for (int i = 0; i < places; i++) {
-		const struct texture *picture;
-		struct made made;
-		double here[BAND_COUNT];
 		/* Places that keep apart: multiples of the golden section and of the root of 2. */
 		there.camera.position_m[0] = scene->clouds.tile_m * fmod(0.6180340 * i, 1);
 		there.camera.position_m[1] = scene->clouds.tile_m * fmod(0.4142136 * i, 1);
-		bool ok = make(deck, &there, &made);
-		if (ok) {
-			const struct view_inputs inputs = inputs_of(&made);
-			stage_upload_block(&deck->context);
-			ok = view_stage_run(&deck->view, &deck->context, &there, &inputs, &layer, 1, NULL, NULL, &picture);
-		}
-		if (ok)
-			flux_of(&there, picture, here);
-		droplets_release(&deck->context);
-		if (!ok)
-			return false;
-		for (int band = 0; band < BAND_COUNT; band++)
-			flux[band] += here[band] / places;
+		for (int face = 0; face < FACES; face++)
+			if (!look_at_face(deck, there, face, layer, rgb))
+				return false;
 	}
+	bands_of(rgb, flux);
+	for (int band = 0; band < BAND_COUNT; band++)
+		flux[band] /= places;
 	return true;
 }
 

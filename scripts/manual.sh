@@ -10,8 +10,8 @@ escape() { sed -E -e 's/\\/\\e/g' -e 's/([a-z)])\. ([A-Z])/\1.\n\2/g' | sed -e "
 
 # Lines "  -o, --output FILE  text" become items of a list; other lines stay.
 items() {
-	sed -E -e 's/^  (-(.), )?--([a-z-]+) ([^ ]+) +(.*)$/.It @\2@Fl -\3 Ar \4\n\5/;t' \
-		-e 's/^  (-(.), )?--([a-z-]+) +(.*)$/.It @\2@Fl -\3\n\4/' | sed -E -e 's/@(.)@/Fl \1 , /' -e 's/@@//'
+	sed -E -e 's/^  (-(.), )?--([a-z-]+) ([^ ]+) +(.*)$/.It @\2@Fl -\3 Ar \4\n\\\&\5/;t' \
+		-e 's/^  (-(.), )?--([a-z-]+) +(.*)$/.It @\2@Fl -\3\n\\\&\4/' | sed -E -e 's/@(.)@/Fl \1 , /' -e 's/@@//'
 }
 
 # Of stratusd: below the text of a flag are its variable and its default.

@@ -507,6 +507,6 @@ def test_unknown_paths_share_one_label(daemon):
     samples = parse_metrics(daemon.get("/metrics").body.decode())
     routes = {re.search(r'route="([^"]*)"', name)[1] for name in samples if "route=" in name}
     known = set(
-        "/v1/render /v1/optics /v1/slab /v1/sky /v1/sun /v1/assets /v1/assets/NAME /v1/presets / /openapi.yaml /healthz /readyz /metrics other".split()
+        "/v1/render /v1/compare /v1/optics /v1/slab /v1/sky /v1/sun /v1/assets /v1/assets/NAME /v1/presets / /openapi.yaml /healthz /readyz /metrics other".split()
     )
     assert routes <= known

@@ -126,28 +126,41 @@ inline vec4 texelFetch(const sampler2D &sampler, ivec2 at, int level)
 	return from.texels[(size_t)at.y * (size_t)from.width + (size_t)at.x];
 }
 
-/* One level in three dimensions, filtered linearly and clamped. */
+/* In three dimensions, filtered linearly; each level half as large as the one before it. */
 struct volume {
 	int width, height, depth;
 	std::vector<vec4> texels;
+	bool repeat = false;
+	std::vector<volume> coarser;
 };
 
 using sampler3D = std::shared_ptr<const volume>;
 
-inline vec4 textureLod(const sampler3D &sampler, vec3 at, float)
+inline vec4 sample_volume(const volume &volume, vec3 at)
 {
-	assert(sampler && std::isfinite(at.x) && std::isfinite(at.y) && std::isfinite(at.z));
-	const ivec3 size(sampler->width, sampler->height, sampler->depth);
+	const ivec3 size(volume.width, volume.height, volume.depth);
 	const vec3 p = at * vec3(size) - 0.5f, base = glm::floor(p), f = p - base;
 	vec4 sum(0.0f);
 	for (int corner = 0; corner < 8; corner++) {
-		const ivec3 offset(corner & 1, corner >> 1 & 1, corner >> 2);
-		const ivec3 texel = glm::clamp(ivec3(base) + offset, ivec3(0), size - 1);
+		const ivec3 offset(corner & 1, corner >> 1 & 1, corner >> 2), texel = ivec3(base) + offset;
 		const vec3 weight = glm::mix(1.0f - f, f, vec3(offset));
+		const int x = wrap_texel(texel.x, size.x, volume.repeat), y = wrap_texel(texel.y, size.y, volume.repeat),
+			  z = wrap_texel(texel.z, size.z, volume.repeat);
 		sum += weight.x * weight.y * weight.z *
-		       sampler->texels[((size_t)texel.z * (size_t)size.y + (size_t)texel.y) * (size_t)size.x + (size_t)texel.x];
+		       volume.texels[((size_t)z * (size_t)size.y + (size_t)y) * (size_t)size.x + (size_t)x];
 	}
 	return sum;
+}
+
+inline vec4 textureLod(const sampler3D &sampler, vec3 at, float lod)
+{
+	assert(sampler && std::isfinite(at.x) && std::isfinite(at.y) && std::isfinite(at.z) && std::isfinite(lod));
+	const int last = (int)sampler->coarser.size();
+	const float bounded = glm::clamp(lod, 0.0f, (float)last);
+	const int level = (int)bounded;
+	const volume &fine = level ? sampler->coarser[(size_t)level - 1] : *sampler;
+	const vec4 found = sample_volume(fine, at);
+	return level == last ? found : glm::mix(found, sample_volume(sampler->coarser[(size_t)level], at), bounded - (float)level);
 }
 
 /* Samplers of the library. */

@@ -292,16 +292,27 @@ static glsl::sampler2D copy_of(const texture *texture)
 	return image;
 }
 
+static glsl::volume copy_of_volume_level(const texture *texture, int level, bool repeat)
+{
+	glsl::volume volume;
+	volume.repeat = repeat;
+	glGetTextureLevelParameteriv(texture->id, level, GL_TEXTURE_WIDTH, &volume.width);
+	glGetTextureLevelParameteriv(texture->id, level, GL_TEXTURE_HEIGHT, &volume.height);
+	glGetTextureLevelParameteriv(texture->id, level, GL_TEXTURE_DEPTH, &volume.depth);
+	volume.texels.resize((size_t)volume.width * (size_t)volume.height * (size_t)volume.depth);
+	glGetTextureImage(texture->id, level, GL_RGBA, GL_FLOAT, (GLsizei)(volume.texels.size() * sizeof(glsl::vec4)), &volume.texels[0].x);
+	return volume;
+}
+
 static glsl::sampler3D copy_of_volume(const texture *texture)
 {
-	auto volume = std::make_shared<glsl::volume>();
+	GLint wrap;
 	if (!texture)
 		return nullptr;
-	volume->width = texture->width;
-	volume->height = texture->height;
-	volume->depth = texture->depth;
-	volume->texels.resize((size_t)texture->width * (size_t)texture->height * (size_t)texture->depth);
-	glGetTextureImage(texture->id, 0, GL_RGBA, GL_FLOAT, (GLsizei)(volume->texels.size() * sizeof(glsl::vec4)), &volume->texels[0].x);
+	glGetTextureParameteriv(texture->id, GL_TEXTURE_WRAP_R, &wrap);
+	auto volume = std::make_shared<glsl::volume>(copy_of_volume_level(texture, 0, wrap == GL_REPEAT));
+	for (int level = 1; level < texture->levels; level++)
+		volume->coarser.push_back(copy_of_volume_level(texture, level, wrap == GL_REPEAT));
 	return volume;
 }
 
@@ -318,6 +329,8 @@ static void copy_textures(const made &out)
 	glsl::field_detail = copy_of(out.field.detail_packed ? out.field.detail_packed : out.field.detail);
 	glsl::height_table = copy_of(out.field.height);
 	glsl::height_light = copy_of(out.field.light);
+	glsl::height_puff_layers = copy_of(out.field.puffs ? &out.field.puffs->layers : nullptr);
+	glsl::height_puffs = copy_of_volume(out.field.puffs ? &out.field.puffs->volume : nullptr);
 	glsl::smooth_table = copy_of(out.field.smooth);
 	glsl::phase_table = copy_of(&out.drops->phase);
 	glsl::event_table = copy_of(&out.drops->events);
@@ -345,11 +358,19 @@ static glsl::sampler2D pass_to_texture(void (*pass)(glsl::ivec2), int output, in
 	return image;
 }
 
+static glsl::sampler2D begin_blocks(int side, int begun)
+{
+	glsl::arguments[0] = glsl::vec4((float)side, (float)begun, 0.0f, 0.0f);
+	return pass_to_texture(glsl::height_start_pass::pass, 0, (WIDTH + side - 1) / side, (HEIGHT + side - 1) / side);
+}
+
 /* What the height view stage makes of a camera above the clouds. */
 static void look_at_heights()
 {
 	const int block = glsl::height_start_pass::HEIGHT_BLOCK;
-	glsl::height_start = pass_to_texture(glsl::height_start_pass::pass, 0, (WIDTH + block - 1) / block, (HEIGHT + block - 1) / block);
+	glsl::height_start = begin_blocks(4 * block, 0);
+	glsl::height_start = begin_blocks(block, 4 * block);
+	glsl::arguments[0] = glsl::vec4(0.0f);
 	glsl::seen_place = pass_to_texture(glsl::height_view_pass::pass, 0, WIDTH, HEIGHT);
 	glsl::seen_light = pass_to_texture(glsl::height_view_pass::pass, 1, WIDTH, HEIGHT);
 }
@@ -361,12 +382,11 @@ static picture render_cpu(int variant, const made &out)
 	glsl::set_scene_block(shared.context.block);
 	if (out.field.light)
 		look_at_heights();
-	/* All paths are shown. */
-	glsl::arguments[1] = glsl::arguments[2] = glsl::arguments[3] = glsl::vec4(1.0f);
 	for (int i = 0; i < LAYERS; i++) {
 		glsl::arguments[0].x = (float)layers[i];
-		for (int k = 1; k < 4; k++)
-			glsl::arguments[k] = glsl::vec4(1.0f); /* all paths */
+		/* All paths are shown, and all rows are held. */
+		glsl::arguments[1] = glsl::arguments[2] = glsl::vec4(1.0f);
+		glsl::arguments[3] = glsl::vec4(1.0f, 1.0f, 0.0f, 0.0f);
 		for (int y = 0; y < HEIGHT; y++)
 			for (int x = 0; x < WIDTH; x++) {
 				cpu_pass[variant](glsl::ivec2(x, y));
@@ -401,14 +421,14 @@ static difference compare(const std::vector<float> &a, const std::vector<float> 
 	return {10 * std::log10(peak * peak / mean_square), outside / count};
 }
 
-static void compare_layers(const char *what, const picture &a, const picture &b, double floor)
+static void compare_layers(const char *what, const picture &a, const picture &b, double floor, double outside)
 {
 	for (int i = 0; i < LAYERS; i++) {
 		const difference d = compare(a.layer[i], b.layer[i]);
 		print_message("%s, %s: %.1f dB, %.2f %% of values differ by over 0.1 %%\n", what, scene_layer_names[layers[i]], d.psnr,
 			      100 * d.outside);
 		assert_true(d.psnr >= floor);
-		assert_true(d.outside <= 0.02);
+		assert_true(d.outside <= outside);
 	}
 }
 
@@ -422,7 +442,9 @@ static void gpu_shows_what_the_library_says(void **)
 	for (int i = 0; i < VARIANTS; i++) {
 		made out = {};
 		by_fragments[i] = render_gpu(make_scene(i), out);
-		compare_layers(variant_names[i], by_fragments[i], render_cpu(i, out), floor);
+		/* Of bytes even software interpolates in bytes, and the puffs on tops are such. */
+		const bool bytes = out.field.puffs;
+		compare_layers(variant_names[i], by_fragments[i], render_cpu(i, out), bytes ? 50 : floor, bytes ? 0.25 : 0.02);
 	}
 	stop();
 }
@@ -432,7 +454,7 @@ static void compute_shows_what_fragments_show(void **)
 	start(PASS_COMPUTE);
 	for (int i = 0; i < VARIANTS; i++) {
 		made out = {};
-		compare_layers(variant_names[i], by_fragments[i], render_gpu(make_scene(i), out), 90);
+		compare_layers(variant_names[i], by_fragments[i], render_gpu(make_scene(i), out), 90, 0.02);
 	}
 	stop();
 }

@@ -3,6 +3,7 @@
 #include "renderer/image/regions.h"
 #include "server/scene_json.h"
 #include "server/scene_rules.h"
+#include "server/variant_name.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -83,17 +84,64 @@ static bool read_name(const json_t *value, const char *pointer, char name[static
 	return false;
 }
 
-/* A variant without a name has that of its model. */
-static void choose_name(struct compare_variant *variant)
+static bool is_taken(const struct compare_query *query, const struct compare_variant *variant)
 {
-	const struct scene_model *model = &variant->input.scene.model;
-	const char *name = model->name == MODEL_SLAB ? scene_shading_names[model->shading] : scene_model_names[model->name];
-	snprintf(variant->name, sizeof variant->name, "%s", name);
+	for (const struct compare_variant *other = query->variant; other < query->variant + query->variant_count; other++)
+		if (other != variant && strcmp(other->name, variant->name) == 0)
+			return true;
+	return false;
 }
 
-static int find_variant(const struct compare_query *query, int count, const char *name)
+/* The name of the variant's model where it changes nothing else, or what it changes. false: nothing, and the model's name is taken. */
+static bool choose_name(const struct compare_query *query, struct compare_variant *variant, const json_t *patch)
 {
-	for (int i = 0; i < count; i++)
+	enum { ROOM = COMPARE_NAME_SIZE - 3 };
+	const struct scene_model *model = &variant->input.scene.model;
+	const char *own = model->name == MODEL_SLAB ? scene_shading_names[model->shading] : scene_model_names[model->name];
+	char changes[COMPARE_NAME_SIZE];
+	variant_name_of_patch(patch, changes, sizeof changes);
+	snprintf(variant->name, sizeof variant->name, "%s", own);
+	if (variant_changes_only_model(patch) && !is_taken(query, variant))
+		return true;
+	if (!*changes)
+		return false;
+	snprintf(variant->name, sizeof variant->name, "%s", changes);
+	for (char number = '2'; is_taken(query, variant); number++) /* ends: there are few variants */
+		snprintf(variant->name, sizeof variant->name, "%.*s-%c", ROOM, changes, number);
+	return true;
+}
+
+static void read_given_name(const json_t *patch, int index, struct compare_query *query, struct problem *problem)
+{
+	struct compare_variant *variant = &query->variant[index];
+	const json_t *name = json_object_get(patch, "name");
+	char pointer[64];
+	snprintf(pointer, sizeof pointer, "/variants/%d/name", index);
+	if (name && read_name(name, pointer, variant->name, problem) && is_taken(query, variant))
+		problem_add(problem, pointer, "is needed: \"%s\" is the name of another variant", variant->name);
+}
+
+/* Those that change the model alone choose before the others, so that the plain names are theirs. */
+static void name_variants(const json_t *variants, struct compare_query *query, struct problem *problem)
+{
+	size_t i;
+	json_t *patch;
+	json_array_foreach((json_t *)variants, i, patch) read_given_name(patch, (int)i, query, problem);
+	for (int model = 1; model >= 0; model--)
+		json_array_foreach((json_t *)variants, i, patch)
+		{
+			char pointer[64];
+			if (!json_is_object(patch) || json_object_get(patch, "name") || variant_changes_only_model(patch) != model)
+				continue;
+			snprintf(pointer, sizeof pointer, "/variants/%zu/name", i);
+			if (!choose_name(query, &query->variant[i], patch))
+				problem_add(problem, pointer, "is needed: \"%s\" is the name of another variant", query->variant[i].name);
+		}
+}
+
+static int find_variant(const struct compare_query *query, const char *name)
+{
+	for (int i = 0; i < query->variant_count; i++)
 		if (strcmp(query->variant[i].name, name) == 0)
 			return i;
 	return -1;
@@ -152,8 +200,7 @@ static void read_scene(const json_t *root, int index, const json_t *patch, struc
 
 static void read_variant(const json_t *root, int index, struct compare_query *query, struct problem *problem)
 {
-	struct compare_variant *variant = &query->variant[index];
-	const json_t *patch = json_array_get(json_object_get(root, "variants"), (size_t)index), *name;
+	const json_t *patch = json_array_get(json_object_get(root, "variants"), (size_t)index);
 	char pointer[64];
 	snprintf(pointer, sizeof pointer, "/variants/%d", index);
 	if (!json_is_object(patch)) {
@@ -161,14 +208,6 @@ static void read_variant(const json_t *root, int index, struct compare_query *qu
 		return;
 	}
 	read_scene(root, index, patch, query, problem);
-	name = json_object_get(patch, "name");
-	snprintf(pointer, sizeof pointer, "/variants/%d/name", index);
-	if (!name)
-		choose_name(variant);
-	else if (!read_name(name, pointer, variant->name, problem))
-		return;
-	if (find_variant(query, index, variant->name) >= 0)
-		problem_add(problem, pointer, "is needed: \"%s\" is the name of another variant", variant->name);
 	snprintf(pointer, sizeof pointer, "/variants/%d/output", index);
 	if (json_object_get(patch, "output"))
 		problem_add(problem, pointer, "all variants have the scene's output");
@@ -185,6 +224,7 @@ static void read_variants(const json_t *root, struct compare_query *query, struc
 	query->variant_count = (int)count;
 	for (int i = 0; i < query->variant_count; i++)
 		read_variant(root, i, query, problem);
+	name_variants(variants, query, problem);
 }
 
 /* The model reference where one is, else the first. */
@@ -196,7 +236,7 @@ static void choose_truth(const json_t *root, struct compare_query *query, struct
 			query->truth = i;
 	if (!given)
 		return;
-	const int named = json_is_string(given) ? find_variant(query, query->variant_count, json_string_value(given)) : -1;
+	const int named = json_is_string(given) ? find_variant(query, json_string_value(given)) : -1;
 	if (named < 0)
 		problem_add(problem, "/reference", "must be the name of a variant");
 	else

@@ -1,11 +1,12 @@
 """/v1/compare: what it answers, held against the pictures themselves and against FLIP written down a second time."""
 import json
 import math
+import subprocess
 
 import numpy
 import pytest
 
-from conftest import wait_for
+from conftest import BUILD, wait_for
 
 SMALL = {"output": {"width": 96, "height": 64, "exr_type": "float"}}
 PAPER = [{}, {"model": {"shading": "paper"}}]
@@ -191,6 +192,27 @@ def test_variants_are_merge_patches(daemon):
     assert all("elevation_deg=20" in variant["location"] for variant in answer["variants"])
 
 
+@pytest.mark.parametrize("variants, names", [
+    ([{}, {"radiosity": {"enabled": False}}], ["solved", "radiosity-enabled-false"]),
+    ([{"sun": {"elevation_deg": -4}}, {}], ["sun-elevation_deg--4", "solved"]),
+    ([{}, {"clouds": {"coverage": 0.55}}, {"clouds": {"coverage": 0.4}, "ground": {"type": "snow"}}],
+     ["solved", "clouds-coverage-0_55", "coverage-0_4-type-snow"]),
+    ([{"name": "paper"}, {"model": {"shading": "paper"}}, {}], ["paper", "model-shading-paper", "solved"]),
+    ([{"camera": {"position_m": [0, 0, 300.5]}}, {"sun": None}, {"sun": None}], ["camera-position_m-0-0-300_5", "sun-default", "sun-default-2"]),
+])
+def test_variants_are_named_by_what_they_change(daemon, variants, names):
+    answer = compare(daemon, {"scene": {"output": {"width": 32, "height": 24}}, "variants": variants})
+    assert answer.status == 200, answer.json
+    assert [variant["name"] for variant in answer.json["variants"]] == names
+
+
+def test_client_needs_no_names(daemon):
+    done = subprocess.run(
+        [str(BUILD / "stratus"), "compare", "--server", f"http://127.0.0.1:{daemon.port}", "--set", "output.width=32", "--set", "output.height=24",
+         "--with", "radiosity.enabled=false"], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and "radiosity-enabled-false" in done.stdout, done.stderr
+
+
 def test_regions(daemon):
     """Looking up from below there is no ground; a rectangle is measured by itself."""
     body = {
@@ -247,13 +269,16 @@ def test_black_ground_at_night_has_no_figures(daemon):
     ({"scene": {"sun": {"elevation_deg": 91}}, "variants": [{}, {"sun": {"elevation_deg": 3}, "model": {"shading": "paper"}}]},
      {"/scene/sun/elevation_deg"}),
     ({"variants": [{}, {"model": {"shading": "none"}, "name": "x"}]}, {"/variants/1/model/shading"}),
+    ({"variants": [{}, {"model": {"shading": "none"}}]}, {"/variants/1/model/shading"}),
+    ({"variants": [{}, {"clouds": {"coverage": 2}}]}, {"/variants/1/clouds/coverage"}),
     ({"variants": [{}, {"moon": {}, "name": "x"}]}, {"/variants/1/moon"}),
     ({"variants": [{}, {"clouds": {"base_m": 1}, "camera": {"position_m": [0, 0, -1]}, "name": "x"}]},
      {"/variants/1/clouds/base_m", "/variants/1/camera/position_m/2"}),
     ({"scene": {"camera": {"position_m": [0, 0, 300]}}, "variants": [{}, {"clouds": {"base_m": 200}, "name": "x"}]},
      {"/scene/camera/position_m/2"}),
     ({"variants": [{}, {}]}, {"/variants/1/name"}),
-    ({"variants": [{"name": "paper"}, {"model": {"shading": "paper"}}]}, {"/variants/1/name"}),
+    ({"variants": [{"name": "one"}, {"name": "one", "model": {"shading": "paper"}}]}, {"/variants/1/name"}),
+    ({"variants": [{"name": "solved", "sun": {"elevation_deg": 3}}, {}]}, {"/variants/1/name"}),
     ({"variants": [{"name": ""}, {"name": "a.b"}]}, {"/variants/0/name", "/variants/1/name"}),
     ({"variants": [{}, {"name": "x", "output": {"width": 64}}]}, {"/variants/1/output"}),
     ({"variants": [{}, {"name": "x", "camera": {"projection": "fisheye"}}]}, {"/variants/1/camera"}),

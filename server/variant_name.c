@@ -25,8 +25,7 @@ static void add_value(struct draft *draft, const json_t *value)
 	char number[32];
 	size_t index;
 	json_t *element;
-	json_array_foreach((json_t *)value, index, element)
-		add_value(draft, element);
+	json_array_foreach((json_t *)value, index, element) add_value(draft, element);
 	if (json_is_number(value)) {
 		snprintf(number, sizeof number, "%.6g", json_number_value(value));
 		add_word(draft, '-', number);
@@ -61,18 +60,16 @@ static void write_draft(struct draft *draft, const json_t *patch, bool with_sect
 	const char *section;
 	json_t *members;
 	*draft = (struct draft){0};
-	json_object_foreach((json_t *)patch, section, members)
-		if (strcmp(section, "name") != 0)
-			add_section(draft, section, members, with_sections);
+	json_object_foreach((json_t *)patch, section, members) if (strcmp(section, "name") != 0)
+		add_section(draft, section, members, with_sections);
 }
 
 bool variant_changes_only_model(const json_t *patch)
 {
 	const char *section;
 	json_t *members;
-	json_object_foreach((json_t *)patch, section, members)
-		if (strcmp(section, "name") != 0 && strcmp(section, "model") != 0)
-			return false;
+	json_object_foreach((json_t *)patch, section,
+			    members) if (strcmp(section, "name") != 0 && strcmp(section, "model") != 0) return false;
 	return true;
 }
 

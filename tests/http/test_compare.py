@@ -2,6 +2,7 @@
 import json
 import math
 import subprocess
+import time
 
 import numpy
 import pytest
@@ -321,6 +322,41 @@ def test_deadline(daemon):
     scene = {"output": {"width": 2048, "height": 2048}, "clouds": {"seed": 77}}
     answer = compare(daemon, {"scene": scene, "variants": [{"name": n} for n in "abcd"]}, X_Timeout_Ms="1")
     assert answer.status == 504
+
+
+LARGE = {"scene": {"output": {"width": 4096, "height": 1024}, "clouds": {"type": "none"}}, "variants": PAPER, "regions": ["all"]}
+
+
+@pytest.fixture(scope="module")
+def large(daemon):
+    """What comparing and all of the rest take, ms; only the comparing can be longer than the drawing of a clear sky."""
+    answer = compare(daemon, LARGE, X_Timeout_Ms="120000")
+    assert answer.status == 200
+    return {name: float(part["dur"]) for name, part in answer.timing.items()}
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_deadline_while_comparing(daemon, large, share):
+    """Also while figures are made: the answer comes soon after the deadline."""
+    deadline = large["total"] - large.get("encode", 0) - (1 - share) * large["compare"]
+    began = time.monotonic()
+    answer = compare(daemon, LARGE, X_Timeout_Ms=str(int(deadline)))
+    took = 1000 * (time.monotonic() - began) - deadline
+    # The machine may be quicker or slower than before: then it is done, or it was drawing.
+    assert answer.status in (200, 504)
+    assert took < max(300, 0.25 * large["compare"])
+
+
+def test_leaving_while_comparing(daemon, large):
+    ended = 'stratus_renders_ended_total{reason="abandoned"}'
+    before = daemon.metric(ended)
+    connection = daemon.connect()
+    connection.request("POST", "/v1/compare", json.dumps(LARGE), {"Content-Type": "application/json"})
+    time.sleep((large["total"] - large.get("encode", 0) - 0.7 * large["compare"]) / 1000)
+    connection.close()
+    left = time.monotonic()
+    assert wait_for(lambda: daemon.metric(ended) == before + 1)
+    assert time.monotonic() - left < 1 + 0.25 * large["compare"] / 1000
 
 
 def test_maps_are_compared(daemon, example_map):

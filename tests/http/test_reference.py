@@ -31,6 +31,7 @@ def test_same_seed_same_bytes(daemon):
 def test_pictures_tell_their_samples(daemon, read_image):
     pixels, spec = read_image(daemon.render(float_exr(samples=6)).body)
     assert spec.getattribute("stratus:samples") == 6 and spec.getattribute("stratus:partial") == 0
+    assert not [attribute.name for attribute in spec.extra_attribs if "illuminance" in attribute.name]  # they would be the slab's
     error = layer(pixels, spec, "standard_error")
     assert numpy.isfinite(error).all() and (error >= 0).all() and error.mean() > 0
     _, spec = read_image(daemon.render(scene_of()).body)

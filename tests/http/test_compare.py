@@ -169,7 +169,9 @@ def test_negotiation(daemon, accept, kind):
 
 
 def test_nothing_acceptable(daemon):
-    assert compare(daemon, {"variants": PAPER}, Accept="text/html").status == 406
+    answer = compare(daemon, {"variants": PAPER}, Accept="text/html")
+    assert answer.status == 406 and answer.headers["Vary"] == "Accept"
+    assert "application/json" in answer.json["detail"] and "image" not in answer.json["title"]
 
 
 def test_the_same_scene_differs_nowhere(daemon):

@@ -198,6 +198,28 @@ static void read_scene(const json_t *root, int index, const json_t *patch, struc
 	json_decref(scene);
 }
 
+/* A null takes a member away before the scene is read, so that only here it is seen to be none. */
+static void check_nulls(const json_t *patch, int index, struct problem *problem)
+{
+	const char *section, *name;
+	json_t *members, *value;
+	json_object_foreach((json_t *)patch, section, members)
+	{
+		char pointer[POINTER_SIZE], member[POINTER_SIZE];
+		snprintf(pointer, sizeof pointer, "/variants/%d", index);
+		pointer_append(pointer, sizeof pointer, section);
+		if (json_is_null(members) && strcmp(section, "name") != 0 && !scene_section_exists(section))
+			problem_add(problem, pointer, "is not a member of a scene");
+		json_object_foreach(members, name, value)
+		{
+			snprintf(member, sizeof member, "%s", pointer);
+			pointer_append(member, sizeof member, name);
+			if (json_is_null(value) && scene_section_exists(section) && !scene_field_find(section, name))
+				problem_add(problem, member, "is not a member of a scene");
+		}
+	}
+}
+
 static void read_variant(const json_t *root, int index, struct compare_query *query, struct problem *problem)
 {
 	const json_t *patch = json_array_get(json_object_get(root, "variants"), (size_t)index);
@@ -208,6 +230,7 @@ static void read_variant(const json_t *root, int index, struct compare_query *qu
 		return;
 	}
 	read_scene(root, index, patch, query, problem);
+	check_nulls(patch, index, problem);
 	snprintf(pointer, sizeof pointer, "/variants/%d/output", index);
 	if (json_object_get(patch, "output"))
 		problem_add(problem, pointer, "all variants have the scene's output");
@@ -277,6 +300,15 @@ static bool read_side(const json_t *value, double low, double high, int *number)
 	return true;
 }
 
+/* The index of a region that every picture has, or -1. */
+static int known_region(const char *name)
+{
+	for (int i = 0; i < KNOWN_REGIONS; i++)
+		if (strcmp(name, known_regions[i].name) == 0)
+			return i;
+	return -1;
+}
+
 /* {"name": "sun", "rectangle": [x, y, width, height]} */
 static void read_rectangle(const json_t *value, const char *pointer, const struct scene_output *output, struct compare_region *region,
 			   struct problem *problem)
@@ -293,7 +325,8 @@ static void read_rectangle(const json_t *value, const char *pointer, const struc
 			problem_add(problem, at, "is not a member of a region");
 	}
 	snprintf(at, sizeof at, "%s/name", pointer);
-	read_name(json_object_get(value, "name"), at, region->name, problem);
+	if (read_name(json_object_get(value, "name"), at, region->name, problem) && known_region(region->name) >= 0)
+		problem_add(problem, at, "is the name of a part of every picture");
 	snprintf(at, sizeof at, "%s/rectangle", pointer);
 	region->is_rectangle = true;
 	region->bits = REGION_ALL;
@@ -313,12 +346,12 @@ static void read_region(const json_t *value, const char *pointer, const struct s
 		read_rectangle(value, pointer, output, region, problem);
 		return;
 	}
-	for (int i = 0; i < KNOWN_REGIONS; i++)
-		if (json_is_string(value) && strcmp(json_string_value(value), known_regions[i].name) == 0) {
-			snprintf(region->name, sizeof region->name, "%s", known_regions[i].name);
-			region->bits = known_regions[i].bits;
-			return;
-		}
+	const int known = json_is_string(value) ? known_region(json_string_value(value)) : -1;
+	if (known >= 0) {
+		snprintf(region->name, sizeof region->name, "%s", known_regions[known].name);
+		region->bits = known_regions[known].bits;
+		return;
+	}
 	problem_add(problem, pointer, "must be one of all, cloud, sky, ground, or {\"name\", \"rectangle\": [x, y, width, height]}");
 }
 

@@ -291,7 +291,11 @@ def test_black_ground_at_night_has_no_figures(daemon):
     ({"variants": PAPER, "regions": ["sky", "sky"]}, {"/regions/1"}),
     ({"variants": PAPER, "regions": [{"name": "x", "rectangle": [0, 0, 1025, 1]}]}, {"/regions/0/rectangle"}),
     ({"variants": PAPER, "regions": [{"rectangle": [0, 0, 1, 1], "sides": 4}]}, {"/regions/0/name", "/regions/0/sides"}),
+    ({"variants": PAPER, "regions": [{"name": "all", "rectangle": [0, 0, 1, 1]}]}, {"/regions/0/name"}),
+    ({"variants": PAPER, "regions": ["all", {"name": "sky", "rectangle": [0, 0, 1, 1]}]}, {"/regions/1/name"}),
     ({"scene": {"output": {"width": 4096, "height": 4096}}, "variants": PAPER}, {"/scene/output"}),
+    ({"variants": [{"name": "a", "foo": None}, {}]}, {"/variants/0/foo"}),
+    ({"variants": [{}, {"sun": {"foo": None, "elevation_deg": None}}]}, {"/variants/1/sun/foo"}),
     ({"variants": [{}, {"clouds": {"map": "nothing"}, "name": "x"}]}, {"/variants/1/clouds/map"}),
     ({"scene": {"clouds": {"map": "nothing"}}, "variants": PAPER}, {"/scene/clouds/map"}),
 ])

@@ -96,6 +96,7 @@ def test_partial_at_the_deadline(daemon, read_image):
     long = scene_of({"samples": 65536}, width=64, height=48)
     assert daemon.render(long, X_Timeout_Ms="1500").status == 504
     long["model"]["partial"] = True
+    assert daemon.render(long, X_Timeout_Ms="1").status == 504  # no pixel has a sample yet
     answer = daemon.render(long, X_Timeout_Ms="8000")
     assert answer.status == 200 and answer.headers["Stratus-Partial"] == "true" and answer.headers["ETag"] is None
     _, spec = read_image(answer.body)

@@ -3,6 +3,7 @@
 #include "renderer/image/regions.h"
 #include "server/scene_json.h"
 #include "server/scene_rules.h"
+#include "server/variant_name.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -83,17 +84,64 @@ static bool read_name(const json_t *value, const char *pointer, char name[static
 	return false;
 }
 
-/* A variant without a name has that of its model. */
-static void choose_name(struct compare_variant *variant)
+static bool is_taken(const struct compare_query *query, const struct compare_variant *variant)
 {
-	const struct scene_model *model = &variant->input.scene.model;
-	const char *name = model->name == MODEL_SLAB ? scene_shading_names[model->shading] : scene_model_names[model->name];
-	snprintf(variant->name, sizeof variant->name, "%s", name);
+	for (const struct compare_variant *other = query->variant; other < query->variant + query->variant_count; other++)
+		if (other != variant && strcmp(other->name, variant->name) == 0)
+			return true;
+	return false;
 }
 
-static int find_variant(const struct compare_query *query, int count, const char *name)
+/* The name of the variant's model where it changes nothing else, or what it changes. false: nothing, and the model's name is taken. */
+static bool choose_name(const struct compare_query *query, struct compare_variant *variant, const json_t *patch)
 {
-	for (int i = 0; i < count; i++)
+	enum { ROOM = COMPARE_NAME_SIZE - 3 };
+	const struct scene_model *model = &variant->input.scene.model;
+	const char *own = model->name == MODEL_SLAB ? scene_shading_names[model->shading] : scene_model_names[model->name];
+	char changes[COMPARE_NAME_SIZE];
+	variant_name_of_patch(patch, changes, sizeof changes);
+	snprintf(variant->name, sizeof variant->name, "%s", own);
+	if (variant_changes_only_model(patch) && !is_taken(query, variant))
+		return true;
+	if (!*changes)
+		return false;
+	snprintf(variant->name, sizeof variant->name, "%s", changes);
+	for (char number = '2'; is_taken(query, variant); number++) /* ends: there are few variants */
+		snprintf(variant->name, sizeof variant->name, "%.*s-%c", ROOM, changes, number);
+	return true;
+}
+
+static void read_given_name(const json_t *patch, int index, struct compare_query *query, struct problem *problem)
+{
+	struct compare_variant *variant = &query->variant[index];
+	const json_t *name = json_object_get(patch, "name");
+	char pointer[64];
+	snprintf(pointer, sizeof pointer, "/variants/%d/name", index);
+	if (name && read_name(name, pointer, variant->name, problem) && is_taken(query, variant))
+		problem_add(problem, pointer, "is needed: \"%s\" is the name of another variant", variant->name);
+}
+
+/* Those that change the model alone choose before the others, so that the plain names are theirs. */
+static void name_variants(const json_t *variants, struct compare_query *query, struct problem *problem)
+{
+	size_t i;
+	json_t *patch;
+	json_array_foreach((json_t *)variants, i, patch) read_given_name(patch, (int)i, query, problem);
+	for (int model = 1; model >= 0; model--)
+		json_array_foreach((json_t *)variants, i, patch)
+		{
+			char pointer[64];
+			if (!json_is_object(patch) || json_object_get(patch, "name") || variant_changes_only_model(patch) != model)
+				continue;
+			snprintf(pointer, sizeof pointer, "/variants/%zu/name", i);
+			if (!choose_name(query, &query->variant[i], patch))
+				problem_add(problem, pointer, "is needed: \"%s\" is the name of another variant", query->variant[i].name);
+		}
+}
+
+static int find_variant(const struct compare_query *query, const char *name)
+{
+	for (int i = 0; i < query->variant_count; i++)
 		if (strcmp(query->variant[i].name, name) == 0)
 			return i;
 	return -1;
@@ -150,10 +198,31 @@ static void read_scene(const json_t *root, int index, const json_t *patch, struc
 	json_decref(scene);
 }
 
+/* A null takes a member away before the scene is read, so that only here it is seen to be none. */
+static void check_nulls(const json_t *patch, int index, struct problem *problem)
+{
+	const char *section, *name;
+	json_t *members, *value;
+	json_object_foreach((json_t *)patch, section, members)
+	{
+		char pointer[POINTER_SIZE], member[POINTER_SIZE];
+		snprintf(pointer, sizeof pointer, "/variants/%d", index);
+		pointer_append(pointer, sizeof pointer, section);
+		if (json_is_null(members) && strcmp(section, "name") != 0 && !scene_section_exists(section))
+			problem_add(problem, pointer, "is not a member of a scene");
+		json_object_foreach(members, name, value)
+		{
+			snprintf(member, sizeof member, "%s", pointer);
+			pointer_append(member, sizeof member, name);
+			if (json_is_null(value) && scene_section_exists(section) && !scene_field_find(section, name))
+				problem_add(problem, member, "is not a member of a scene");
+		}
+	}
+}
+
 static void read_variant(const json_t *root, int index, struct compare_query *query, struct problem *problem)
 {
-	struct compare_variant *variant = &query->variant[index];
-	const json_t *patch = json_array_get(json_object_get(root, "variants"), (size_t)index), *name;
+	const json_t *patch = json_array_get(json_object_get(root, "variants"), (size_t)index);
 	char pointer[64];
 	snprintf(pointer, sizeof pointer, "/variants/%d", index);
 	if (!json_is_object(patch)) {
@@ -161,14 +230,7 @@ static void read_variant(const json_t *root, int index, struct compare_query *qu
 		return;
 	}
 	read_scene(root, index, patch, query, problem);
-	name = json_object_get(patch, "name");
-	snprintf(pointer, sizeof pointer, "/variants/%d/name", index);
-	if (!name)
-		choose_name(variant);
-	else if (!read_name(name, pointer, variant->name, problem))
-		return;
-	if (find_variant(query, index, variant->name) >= 0)
-		problem_add(problem, pointer, "is needed: \"%s\" is the name of another variant", variant->name);
+	check_nulls(patch, index, problem);
 	snprintf(pointer, sizeof pointer, "/variants/%d/output", index);
 	if (json_object_get(patch, "output"))
 		problem_add(problem, pointer, "all variants have the scene's output");
@@ -185,6 +247,7 @@ static void read_variants(const json_t *root, struct compare_query *query, struc
 	query->variant_count = (int)count;
 	for (int i = 0; i < query->variant_count; i++)
 		read_variant(root, i, query, problem);
+	name_variants(variants, query, problem);
 }
 
 /* The model reference where one is, else the first. */
@@ -196,7 +259,7 @@ static void choose_truth(const json_t *root, struct compare_query *query, struct
 			query->truth = i;
 	if (!given)
 		return;
-	const int named = json_is_string(given) ? find_variant(query, query->variant_count, json_string_value(given)) : -1;
+	const int named = json_is_string(given) ? find_variant(query, json_string_value(given)) : -1;
 	if (named < 0)
 		problem_add(problem, "/reference", "must be the name of a variant");
 	else
@@ -237,6 +300,15 @@ static bool read_side(const json_t *value, double low, double high, int *number)
 	return true;
 }
 
+/* The index of a region that every picture has, or -1. */
+static int known_region(const char *name)
+{
+	for (int i = 0; i < KNOWN_REGIONS; i++)
+		if (strcmp(name, known_regions[i].name) == 0)
+			return i;
+	return -1;
+}
+
 /* {"name": "sun", "rectangle": [x, y, width, height]} */
 static void read_rectangle(const json_t *value, const char *pointer, const struct scene_output *output, struct compare_region *region,
 			   struct problem *problem)
@@ -253,7 +325,8 @@ static void read_rectangle(const json_t *value, const char *pointer, const struc
 			problem_add(problem, at, "is not a member of a region");
 	}
 	snprintf(at, sizeof at, "%s/name", pointer);
-	read_name(json_object_get(value, "name"), at, region->name, problem);
+	if (read_name(json_object_get(value, "name"), at, region->name, problem) && known_region(region->name) >= 0)
+		problem_add(problem, at, "is the name of a part of every picture");
 	snprintf(at, sizeof at, "%s/rectangle", pointer);
 	region->is_rectangle = true;
 	region->bits = REGION_ALL;
@@ -273,12 +346,12 @@ static void read_region(const json_t *value, const char *pointer, const struct s
 		read_rectangle(value, pointer, output, region, problem);
 		return;
 	}
-	for (int i = 0; i < KNOWN_REGIONS; i++)
-		if (json_is_string(value) && strcmp(json_string_value(value), known_regions[i].name) == 0) {
-			snprintf(region->name, sizeof region->name, "%s", known_regions[i].name);
-			region->bits = known_regions[i].bits;
-			return;
-		}
+	const int known = json_is_string(value) ? known_region(json_string_value(value)) : -1;
+	if (known >= 0) {
+		snprintf(region->name, sizeof region->name, "%s", known_regions[known].name);
+		region->bits = known_regions[known].bits;
+		return;
+	}
 	problem_add(problem, pointer, "must be one of all, cloud, sky, ground, or {\"name\", \"rectangle\": [x, y, width, height]}");
 }
 

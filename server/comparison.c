@@ -49,42 +49,61 @@ static void measure(struct comparison *comparison, int variant, const struct com
 		figures->flip = difference_span(comparison->flip[variant], comparison->mask, bits, count);
 }
 
-static void measure_all(struct comparison *comparison)
+static bool measure_all(struct comparison *comparison, renderer_cancelled *cancelled, void *context)
 {
 	const struct compare_query *query = comparison->query;
 	for (int r = 0; r < query->region_count; r++) {
 		if (query->region[r].is_rectangle)
 			mark_rectangle(comparison, &query->region[r]);
-		for (int v = 0; v < query->variant_count; v++)
+		for (int v = 0; v < query->variant_count; v++) {
+			if (cancelled(context))
+				return false;
 			measure(comparison, v, &query->region[r], &comparison->figures[v][r]);
+		}
 	}
+	return true;
 }
 
 /* --- pictures
  * ----------------------------------------------------------------------------------------------------------------------------- */
 
-static bool develop(struct comparison *comparison, int variant)
+/* Between two questions whether to go on: some 20 milliseconds. */
+enum { ASK_PIXELS = 1 << 17 };
+
+static bool develop(struct comparison *comparison, int variant, renderer_cancelled *cancelled, void *context)
 {
 	const size_t count = (size_t)comparison->width * (size_t)comparison->height;
+	const float *light = frame_layer(comparison->frame[variant], LAYER_COLOR);
 	unsigned char *codes = comparison->codes[variant] = malloc(3 * count);
-	if (codes)
-		develop_picture(frame_layer(comparison->frame[variant], LAYER_COLOR), count, comparison->exposure_ev,
-				truth_scene(comparison->query)->output.tone, codes);
+	for (size_t first = 0; codes && first < count; first += ASK_PIXELS) {
+		const size_t some = count - first < ASK_PIXELS ? count - first : ASK_PIXELS;
+		if (cancelled(context))
+			return false;
+		develop_picture(light + 3 * first, some, comparison->exposure_ev, truth_scene(comparison->query)->output.tone,
+				codes + 3 * first);
+	}
 	return codes;
 }
 
-static bool look_at(const struct comparison *comparison, int variant, struct flip_picture *seen)
+static bool look_at(const struct comparison *comparison, int variant, renderer_cancelled *cancelled, void *context,
+		    struct flip_picture *seen)
 {
-	return flip_picture_init(seen, comparison->codes[variant], comparison->width, comparison->height, FLIP_PIXELS_PER_DEGREE);
+	return flip_picture_init(seen, comparison->codes[variant], comparison->width, comparison->height, FLIP_PIXELS_PER_DEGREE, cancelled,
+				 context);
 }
 
-static bool flip_one(struct comparison *comparison, int variant, const struct flip_picture *truth)
+static bool flip_one(struct comparison *comparison, int variant, const struct flip_picture *truth, renderer_cancelled *cancelled,
+		     void *context)
 {
+	const size_t count = (size_t)comparison->width * (size_t)comparison->height;
 	struct flip_picture seen;
-	float *map = comparison->flip[variant] = malloc((size_t)comparison->width * (size_t)comparison->height * sizeof *map);
-	const bool ok = look_at(comparison, variant, &seen) && map;
-	if (ok)
-		flip_compare(truth, &seen, map);
+	float *map = comparison->flip[variant] = malloc(count * sizeof *map);
+	bool ok = look_at(comparison, variant, cancelled, context, &seen) && map;
+	for (size_t first = 0; ok && first < count; first += ASK_PIXELS) {
+		ok = !cancelled(context);
+		if (ok)
+			flip_compare(truth, &seen, first, count - first < ASK_PIXELS ? count : first + ASK_PIXELS, map);
+	}
 	flip_picture_finish(&seen);
 	return ok;
 }
@@ -93,9 +112,9 @@ static bool flip_all(struct comparison *comparison, renderer_cancelled *cancelle
 {
 	const struct compare_query *query = comparison->query;
 	struct flip_picture truth;
-	bool ok = look_at(comparison, query->truth, &truth);
+	bool ok = look_at(comparison, query->truth, cancelled, context, &truth);
 	for (int i = 0; ok && i < query->variant_count; i++)
-		ok = i == query->truth || (!cancelled(context) && flip_one(comparison, i, &truth));
+		ok = i == query->truth || flip_one(comparison, i, &truth, cancelled, context);
 	flip_picture_finish(&truth);
 	return ok;
 }
@@ -106,19 +125,18 @@ bool comparison_run(const struct compare_query *query, const struct frame *const
 	const struct frame *truth = frames[query->truth];
 	*comparison = (struct comparison){.query = query, .width = truth->width, .height = truth->height};
 	comparison->exposure_ev = truth->exposure_ev;
+	if (cancelled(context))
+		return false;
 	comparison->mask = malloc((size_t)truth->width * (size_t)truth->height);
 	if (!comparison->mask)
 		return false;
 	regions_find(truth_scene(query), masked, comparison->mask);
 	for (int i = 0; i < query->variant_count; i++) {
 		comparison->frame[i] = frames[i];
-		if (cancelled(context) || !develop(comparison, i))
+		if (!develop(comparison, i, cancelled, context))
 			return false;
 	}
-	if (!flip_all(comparison, cancelled, context))
-		return false;
-	measure_all(comparison);
-	return true;
+	return flip_all(comparison, cancelled, context) && measure_all(comparison, cancelled, context);
 }
 
 void comparison_finish(struct comparison *comparison)

@@ -24,7 +24,8 @@ struct comparison {
 };
 
 /* Compares. frames: of the query's variants, they must outlive the comparison; masked: the one that tells regions, as rendered of
- * mask_scene. cancelled is asked between variants. false when cancelled or out of memory. comparison_finish in any case. */
+ * mask_scene. cancelled is asked every few milliseconds, of large pictures too. false when cancelled or out of memory. comparison_finish in
+ * any case. */
 bool comparison_run(const struct compare_query *query, const struct frame *const *frames, const struct frame *masked,
 		    renderer_cancelled *cancelled, void *context, struct comparison *comparison);
 void comparison_finish(struct comparison *comparison);

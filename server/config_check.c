@@ -30,6 +30,17 @@ static void keep_what_exists(char path[static PATH_MAX])
 	}
 }
 
+/* Tries: permissions say nothing of /proc, nor of a file system that is mounted to be read. Leaves nothing behind. */
+static bool can_hold_files(const char *directory)
+{
+	char probe[PATH_MAX];
+	if (snprintf(probe, sizeof probe, "%s/.stratus-check-XXXXXX", directory) >= (int)sizeof probe) {
+		errno = ENAMETOOLONG;
+		return false;
+	}
+	return mkdtemp(probe) && rmdir(probe) == 0;
+}
+
 static bool check_state_dir(const char *state_dir)
 {
 	char path[PATH_MAX];
@@ -44,7 +55,7 @@ static bool check_state_dir(const char *state_dir)
 		log_error("--state-dir %s: %s is no directory", state_dir, path);
 		return false;
 	}
-	if (!found || access(path, W_OK | X_OK) != 0) {
+	if (!found || !can_hold_files(path)) {
 		log_error("--state-dir %s: %s: %s", state_dir, path, strerror(errno));
 		return false;
 	}

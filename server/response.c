@@ -94,6 +94,8 @@ enum MHD_Result response_send_problem(struct request *request)
 		snprintf(seconds, sizeof seconds, "%u", retry);
 		response_set(response, "Retry-After", seconds);
 	}
+	if (request->problem.kind == PROBLEM_NOT_ACCEPTABLE)
+		response_set(response, "Vary", "Accept");
 	if (request->problem.kind == PROBLEM_METHOD)
 		response_set(response, "Allow", request->route->allow);
 	return response_send(request, problem_status(request->problem.kind), response);

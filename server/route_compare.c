@@ -220,16 +220,15 @@ static void compare(struct work *base)
 	/* What was cut short for the deadline goes out, even if that passes now. */
 	work->ended->deadline_ms = has_partial(work) ? INFINITY : work->deadline_ms;
 	work->ended->outcome = RENDER_OUTCOME_NO_MEMORY; /* unless something else turns up */
-	bool ok = comparison_run(&work->query, frames, work->query.has_masks ? &work->run[MASK_RUN].job.frame : NULL, job_is_over,
-				 work->ended, &comparison);
+	const bool ok = comparison_run(&work->query, frames, work->query.has_masks ? &work->run[MASK_RUN].job.frame : NULL, job_is_over,
+				       work->ended, &comparison);
 	const double compared = clock_now_ms();
 	timings_set(&work->spent, TIMING_COMPARE, compared - start);
-	if (ok) {
-		ok = encode(work, &comparison);
-		work->ended->outcome = ok ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
+	if (ok && !job_is_over(work->ended)) {
+		work->ended->outcome = encode(work, &comparison) ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
 		timings_set(&work->spent, TIMING_ENCODE, clock_now_ms() - compared);
 	}
-	if (ok)
+	if (work->ended->outcome == RENDER_OUTCOME_OK)
 		job_is_over(work->ended);
 	comparison_finish(&comparison);
 	hand_back(work);

@@ -75,6 +75,23 @@ static float hyab(const float a[3], const float b[3])
 	return fabsf(a[0] - b[0]) + hypotf(a[1] - b[1], a[2] - b[2]);
 }
 
+/* --- giving up ------------------------------------------------------------------------------------------------------------------------ */
+
+/* Rows and pixels between two questions: some milliseconds. */
+enum { ASK_ROWS = 64, ASK_PIXELS = 1 << 17 };
+
+struct patience {
+	renderer_cancelled *cancelled;
+	void *context;
+	bool over;
+};
+
+static bool is_over(struct patience *patience)
+{
+	patience->over = patience->over || patience->cancelled(patience->context);
+	return patience->over;
+}
+
 /* --- filters -------------------------------------------------------------------------------------------------------------------------- */
 
 static int clamped_radius(double radius)
@@ -125,9 +142,9 @@ static void filter_row(const float *from, float *to, int width, const struct ker
 }
 
 /* Columns are filtered a row at a time, so that memory is read along its grain. */
-static void filter_columns(const float *from, float *to, int width, int height, const struct kernel_1d *kernel)
+static void filter_columns(const float *from, float *to, int width, int height, const struct kernel_1d *kernel, struct patience *patience)
 {
-	for (int y = 0; y < height; y++) {
+	for (int y = 0; y < height && (y % ASK_ROWS || !is_over(patience)); y++) {
 		float *row = to + (size_t)y * (size_t)width;
 		memset(row, 0, (size_t)width * sizeof *row);
 		for (int k = -kernel->radius; k <= kernel->radius; k++) {
@@ -141,12 +158,12 @@ static void filter_columns(const float *from, float *to, int width, int height, 
 
 /* `spare` is a plane for what is between. */
 static void filter_plane(const float *from, float *to, float *spare, int width, int height, const struct kernel_1d *across,
-			 const struct kernel_1d *down)
+			 const struct kernel_1d *down, struct patience *patience)
 {
 	float padded[WIDTH_MAX + 2 * RADIUS_MAX];
-	for (int y = 0; y < height; y++)
+	for (int y = 0; y < height && (y % ASK_ROWS || !is_over(patience)); y++)
 		filter_row(from + (size_t)y * (size_t)width, spare + (size_t)y * (size_t)width, width, across, padded);
-	filter_columns(spare, to, width, height, down);
+	filter_columns(spare, to, width, height, down, patience);
 }
 
 /* --- one picture ---------------------------------------------------------------------------------------------------------------------- */
@@ -158,7 +175,8 @@ struct sensitivity {
 static const struct sensitivity sensitivities[3] = {{{1, 0}, {0.0047, 1e-5}}, {{1, 0}, {0.0053, 1e-5}}, {{34.1, 13.5}, {0.04, 0.025}}};
 
 /* Planes of `work`: what is filtered, two of its filters' results, and one between. */
-static void filter_seen(float *plane, float *work, int width, int height, const struct sensitivity *sensitivity, double per_degree)
+static void filter_seen(float *plane, float *work, int width, int height, const struct sensitivity *sensitivity, double per_degree,
+			struct patience *patience)
 {
 	const size_t count = (size_t)width * (size_t)height;
 	/* The widest Gaussian, b = 0.04, reaches three deviations. */
@@ -172,15 +190,16 @@ static void filter_seen(float *plane, float *work, int width, int height, const 
 		gauss_kernel(M_PI * M_PI / (b * per_degree * per_degree), radius, &kernel, &sum);
 		weight[i] = sensitivity->a[i] * sqrt(M_PI / b) * sum * sum;
 		if (weight[i] > 0)
-			filter_plane(plane, results[i], work + 2 * count, width, height, &kernel, &kernel);
+			filter_plane(plane, results[i], work + 2 * count, width, height, &kernel, &kernel, patience);
 	}
 	const float share = (float)(weight[0] / (weight[0] + weight[1]));
-	for (size_t i = 0; i < count; i++)
+	for (size_t i = 0; i < count && !patience->over; i++)
 		plane[i] = share >= 1 ? results[0][i] : share * results[0][i] + (1 - share) * results[1][i];
 }
 
 /* Strength of edges, or points, of a plane of luminance. */
-static void find_features(const float *luminance, float *strength, float *work, int width, int height, bool points, double per_degree)
+static void find_features(const float *luminance, float *strength, float *work, int width, int height, bool points, double per_degree,
+			  struct patience *patience)
 {
 	const size_t count = (size_t)width * (size_t)height;
 	const double deviation = 0.5 * 0.082 * per_degree; /* half the width of the human detector of edges, in degrees */
@@ -189,9 +208,9 @@ static void find_features(const float *luminance, float *strength, float *work, 
 	double sum;
 	derivative_kernel(deviation, radius, points, &derivative);
 	gauss_kernel(0.5 / (deviation * deviation), radius, &smooth, &sum);
-	filter_plane(luminance, work, work + 2 * count, width, height, &derivative, &smooth);
-	filter_plane(luminance, work + count, work + 2 * count, width, height, &smooth, &derivative);
-	for (size_t i = 0; i < count; i++)
+	filter_plane(luminance, work, work + 2 * count, width, height, &derivative, &smooth, patience);
+	filter_plane(luminance, work + count, work + 2 * count, width, height, &smooth, &derivative, patience);
+	for (size_t i = 0; i < count && !patience->over; i++)
 		strength[i] = hypotf(work[i], work[count + i]);
 }
 
@@ -204,11 +223,11 @@ static void fill_linear(float linear[256])
 	}
 }
 
-static void split_opponents(const unsigned char *codes, float *planes, size_t count)
+static void split_opponents(const unsigned char *codes, float *planes, size_t count, struct patience *patience)
 {
 	float linear[256];
 	fill_linear(linear);
-	for (size_t i = 0; i < count; i++) {
+	for (size_t i = 0; i < count && (i % ASK_PIXELS || !is_over(patience)); i++) {
 		const float rgb[3] = {linear[codes[3 * i]], linear[codes[3 * i + 1]], linear[codes[3 * i + 2]]};
 		float xyz[3], ycc[3];
 		xyz_of(rgb, xyz);
@@ -218,9 +237,9 @@ static void split_opponents(const unsigned char *codes, float *planes, size_t co
 	}
 }
 
-static void opponents_to_lab(float *planes, size_t count)
+static void opponents_to_lab(float *planes, size_t count, struct patience *patience)
 {
-	for (size_t i = 0; i < count; i++) {
+	for (size_t i = 0; i < count && (i % ASK_PIXELS || !is_over(patience)); i++) {
 		const float ycc[3] = {planes[i], planes[count + i], planes[2 * count + i]};
 		float rgb[3], lab[3];
 		rgb_of_opponents(ycc, rgb);
@@ -230,25 +249,29 @@ static void opponents_to_lab(float *planes, size_t count)
 	}
 }
 
-bool flip_picture_init(struct flip_picture *picture, const unsigned char *codes, int width, int height, double pixels_per_degree)
+bool flip_picture_init(struct flip_picture *picture, const unsigned char *codes, int width, int height, double pixels_per_degree,
+		       renderer_cancelled *cancelled, void *context)
 {
 	const size_t count = (size_t)width * (size_t)height;
+	struct patience patience = {cancelled, context, false};
 	*picture = (struct flip_picture){width, height, malloc(3 * count * sizeof(float)), malloc(2 * count * sizeof(float))};
 	float *work = malloc(4 * count * sizeof *work);
 	const bool ok = picture->lab && picture->features && work;
 	if (ok) {
 		float *luminance = work + 3 * count;
-		split_opponents(codes, picture->lab, count);
-		for (size_t i = 0; i < count; i++)
+		split_opponents(codes, picture->lab, count, &patience);
+		for (size_t i = 0; i < count && !patience.over; i++)
 			luminance[i] = (picture->lab[i] + 16) / 116;
-		find_features(luminance, picture->features, work, width, height, false, pixels_per_degree);
-		find_features(luminance, picture->features + count, work, width, height, true, pixels_per_degree);
-		for (size_t c = 0; c < 3; c++)
-			filter_seen(picture->lab + c * count, work, width, height, &sensitivities[c], pixels_per_degree);
-		opponents_to_lab(picture->lab, count);
+		for (int points = 0; points < 2 && !patience.over; points++)
+			find_features(luminance, picture->features + (size_t)points * count, work, width, height, points, pixels_per_degree,
+				      &patience);
+		for (size_t c = 0; c < 3 && !patience.over; c++)
+			filter_seen(picture->lab + c * count, work, width, height, &sensitivities[c], pixels_per_degree, &patience);
+		if (!patience.over)
+			opponents_to_lab(picture->lab, count, &patience);
 	}
 	free(work);
-	return ok;
+	return ok && !patience.over;
 }
 
 void flip_picture_finish(struct flip_picture *picture)
@@ -276,11 +299,11 @@ static float colour_difference(float distance, float largest)
 	return d < knee ? 0.95f / knee * d : 0.95f + (d - knee) / (largest - knee) * 0.05f;
 }
 
-void flip_compare(const struct flip_picture *truth, const struct flip_picture *picture, float *map)
+void flip_compare(const struct flip_picture *truth, const struct flip_picture *picture, size_t first, size_t end, float *map)
 {
 	const size_t count = (size_t)truth->width * (size_t)truth->height;
 	const float largest = largest_colour_difference();
-	for (size_t i = 0; i < count; i++) {
+	for (size_t i = first; i < end; i++) {
 		float a[3], b[3];
 		for (size_t c = 0; c < 3; c++)
 			a[c] = truth->lab[c * count + i], b[c] = picture->lab[c * count + i];

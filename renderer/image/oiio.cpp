@@ -360,9 +360,11 @@ ImageSpec exr_spec(picture_size size, const struct scene &scene, const struct im
 void describe_frame(ImageSpec &spec, const struct frame &frame)
 {
 	spec.attribute("stratus:exposure_ev", static_cast<float>(frame.exposure_ev));
-	spec.attribute("stratus:global_illuminance_lux", static_cast<float>(frame.global_illuminance_lux));
-	spec.attribute("stratus:direct_illuminance_lux", static_cast<float>(frame.direct_illuminance_lux));
-	spec.attribute("stratus:diffuse_illuminance_lux", static_cast<float>(frame.diffuse_illuminance_lux));
+	if (frame.samples == 0) { /* those of a reference would be the slab's, and its picture has others */
+		spec.attribute("stratus:global_illuminance_lux", static_cast<float>(frame.global_illuminance_lux));
+		spec.attribute("stratus:direct_illuminance_lux", static_cast<float>(frame.direct_illuminance_lux));
+		spec.attribute("stratus:diffuse_illuminance_lux", static_cast<float>(frame.diffuse_illuminance_lux));
+	}
 	if (frame.samples > 0) {
 		spec.attribute("stratus:samples", frame.samples);
 		spec.attribute("stratus:partial", frame.partial ? 1 : 0);

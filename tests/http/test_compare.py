@@ -1,11 +1,13 @@
 """/v1/compare: what it answers, held against the pictures themselves and against FLIP written down a second time."""
 import json
 import math
+import subprocess
+import time
 
 import numpy
 import pytest
 
-from conftest import wait_for
+from conftest import BUILD, wait_for
 
 SMALL = {"output": {"width": 96, "height": 64, "exr_type": "float"}}
 PAPER = [{}, {"model": {"shading": "paper"}}]
@@ -167,7 +169,9 @@ def test_negotiation(daemon, accept, kind):
 
 
 def test_nothing_acceptable(daemon):
-    assert compare(daemon, {"variants": PAPER}, Accept="text/html").status == 406
+    answer = compare(daemon, {"variants": PAPER}, Accept="text/html")
+    assert answer.status == 406 and answer.headers["Vary"] == "Accept"
+    assert "application/json" in answer.json["detail"] and "image" not in answer.json["title"]
 
 
 def test_the_same_scene_differs_nowhere(daemon):
@@ -189,6 +193,27 @@ def test_variants_are_merge_patches(daemon):
         (True, False), (False, True), (True, False)
     ]
     assert all("elevation_deg=20" in variant["location"] for variant in answer["variants"])
+
+
+@pytest.mark.parametrize("variants, names", [
+    ([{}, {"radiosity": {"enabled": False}}], ["solved", "radiosity-enabled-false"]),
+    ([{"sun": {"elevation_deg": -4}}, {}], ["sun-elevation_deg--4", "solved"]),
+    ([{}, {"clouds": {"coverage": 0.55}}, {"clouds": {"coverage": 0.4}, "ground": {"type": "snow"}}],
+     ["solved", "clouds-coverage-0_55", "coverage-0_4-type-snow"]),
+    ([{"name": "paper"}, {"model": {"shading": "paper"}}, {}], ["paper", "model-shading-paper", "solved"]),
+    ([{"camera": {"position_m": [0, 0, 300.5]}}, {"sun": None}, {"sun": None}], ["camera-position_m-0-0-300_5", "sun-default", "sun-default-2"]),
+])
+def test_variants_are_named_by_what_they_change(daemon, variants, names):
+    answer = compare(daemon, {"scene": {"output": {"width": 32, "height": 24}}, "variants": variants})
+    assert answer.status == 200, answer.json
+    assert [variant["name"] for variant in answer.json["variants"]] == names
+
+
+def test_client_needs_no_names(daemon):
+    done = subprocess.run(
+        [str(BUILD / "stratus"), "compare", "--server", f"http://127.0.0.1:{daemon.port}", "--set", "output.width=32", "--set", "output.height=24",
+         "--with", "radiosity.enabled=false"], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and "radiosity-enabled-false" in done.stdout, done.stderr
 
 
 def test_regions(daemon):
@@ -247,13 +272,16 @@ def test_black_ground_at_night_has_no_figures(daemon):
     ({"scene": {"sun": {"elevation_deg": 91}}, "variants": [{}, {"sun": {"elevation_deg": 3}, "model": {"shading": "paper"}}]},
      {"/scene/sun/elevation_deg"}),
     ({"variants": [{}, {"model": {"shading": "none"}, "name": "x"}]}, {"/variants/1/model/shading"}),
+    ({"variants": [{}, {"model": {"shading": "none"}}]}, {"/variants/1/model/shading"}),
+    ({"variants": [{}, {"clouds": {"coverage": 2}}]}, {"/variants/1/clouds/coverage"}),
     ({"variants": [{}, {"moon": {}, "name": "x"}]}, {"/variants/1/moon"}),
     ({"variants": [{}, {"clouds": {"base_m": 1}, "camera": {"position_m": [0, 0, -1]}, "name": "x"}]},
      {"/variants/1/clouds/base_m", "/variants/1/camera/position_m/2"}),
     ({"scene": {"camera": {"position_m": [0, 0, 300]}}, "variants": [{}, {"clouds": {"base_m": 200}, "name": "x"}]},
      {"/scene/camera/position_m/2"}),
     ({"variants": [{}, {}]}, {"/variants/1/name"}),
-    ({"variants": [{"name": "paper"}, {"model": {"shading": "paper"}}]}, {"/variants/1/name"}),
+    ({"variants": [{"name": "one"}, {"name": "one", "model": {"shading": "paper"}}]}, {"/variants/1/name"}),
+    ({"variants": [{"name": "solved", "sun": {"elevation_deg": 3}}, {}]}, {"/variants/1/name"}),
     ({"variants": [{"name": ""}, {"name": "a.b"}]}, {"/variants/0/name", "/variants/1/name"}),
     ({"variants": [{}, {"name": "x", "output": {"width": 64}}]}, {"/variants/1/output"}),
     ({"variants": [{}, {"name": "x", "camera": {"projection": "fisheye"}}]}, {"/variants/1/camera"}),
@@ -263,7 +291,11 @@ def test_black_ground_at_night_has_no_figures(daemon):
     ({"variants": PAPER, "regions": ["sky", "sky"]}, {"/regions/1"}),
     ({"variants": PAPER, "regions": [{"name": "x", "rectangle": [0, 0, 1025, 1]}]}, {"/regions/0/rectangle"}),
     ({"variants": PAPER, "regions": [{"rectangle": [0, 0, 1, 1], "sides": 4}]}, {"/regions/0/name", "/regions/0/sides"}),
+    ({"variants": PAPER, "regions": [{"name": "all", "rectangle": [0, 0, 1, 1]}]}, {"/regions/0/name"}),
+    ({"variants": PAPER, "regions": ["all", {"name": "sky", "rectangle": [0, 0, 1, 1]}]}, {"/regions/1/name"}),
     ({"scene": {"output": {"width": 4096, "height": 4096}}, "variants": PAPER}, {"/scene/output"}),
+    ({"variants": [{"name": "a", "foo": None}, {}]}, {"/variants/0/foo"}),
+    ({"variants": [{}, {"sun": {"foo": None, "elevation_deg": None}}]}, {"/variants/1/sun/foo"}),
     ({"variants": [{}, {"clouds": {"map": "nothing"}, "name": "x"}]}, {"/variants/1/clouds/map"}),
     ({"scene": {"clouds": {"map": "nothing"}}, "variants": PAPER}, {"/scene/clouds/map"}),
 ])
@@ -296,6 +328,41 @@ def test_deadline(daemon):
     scene = {"output": {"width": 2048, "height": 2048}, "clouds": {"seed": 77}}
     answer = compare(daemon, {"scene": scene, "variants": [{"name": n} for n in "abcd"]}, X_Timeout_Ms="1")
     assert answer.status == 504
+
+
+LARGE = {"scene": {"output": {"width": 4096, "height": 1024}, "clouds": {"type": "none"}}, "variants": PAPER, "regions": ["all"]}
+
+
+@pytest.fixture(scope="module")
+def large(daemon):
+    """What comparing and all of the rest take, ms; only the comparing can be longer than the drawing of a clear sky."""
+    answer = compare(daemon, LARGE, X_Timeout_Ms="120000")
+    assert answer.status == 200
+    return {name: float(part["dur"]) for name, part in answer.timing.items()}
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_deadline_while_comparing(daemon, large, share):
+    """Also while figures are made: the answer comes soon after the deadline."""
+    deadline = large["total"] - large.get("encode", 0) - (1 - share) * large["compare"]
+    began = time.monotonic()
+    answer = compare(daemon, LARGE, X_Timeout_Ms=str(int(deadline)))
+    took = 1000 * (time.monotonic() - began) - deadline
+    # The machine may be quicker or slower than before: then it is done, or it was drawing.
+    assert answer.status in (200, 504)
+    assert took < max(300, 0.25 * large["compare"])
+
+
+def test_leaving_while_comparing(daemon, large):
+    ended = 'stratus_renders_ended_total{reason="abandoned"}'
+    before = daemon.metric(ended)
+    connection = daemon.connect()
+    connection.request("POST", "/v1/compare", json.dumps(LARGE), {"Content-Type": "application/json"})
+    time.sleep((large["total"] - large.get("encode", 0) - 0.7 * large["compare"]) / 1000)
+    connection.close()
+    left = time.monotonic()
+    assert wait_for(lambda: daemon.metric(ended) == before + 1)
+    assert time.monotonic() - left < 1 + 0.25 * large["compare"] / 1000
 
 
 def test_maps_are_compared(daemon, example_map):

@@ -76,6 +76,18 @@ def test_faults(tmp_path):
     assert settings(result)["STRATUS_KERNEL"] == flags["--kernel"]
 
 
+def test_a_state_directory_that_cannot_be_made():
+    """Not even by root, whom permissions do not stop."""
+    for state in ("/proc/x", "/proc", "/proc/x/y"):
+        result = check("--state-dir", state, "--kernel", str(KERNEL), "--listen=127.0.0.1:0")
+        assert result.returncode == 2 and f"--state-dir {state}: /proc: " in result.stderr
+
+
+def test_the_check_leaves_an_existing_directory_as_it_was(tmp_path):
+    assert check("--state-dir", str(tmp_path), "--kernel", str(KERNEL), "--listen=127.0.0.1:0").returncode == 0
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("listen", ["192.0.2.1:8080", "[::1", "127.0.0.1:70000", "no-such-host.invalid:80"])
 def test_addresses_that_cannot_be(state, listen):
     result = check("--state-dir", state, "--kernel", str(KERNEL), "--listen", listen)

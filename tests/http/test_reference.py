@@ -31,6 +31,7 @@ def test_same_seed_same_bytes(daemon):
 def test_pictures_tell_their_samples(daemon, read_image):
     pixels, spec = read_image(daemon.render(float_exr(samples=6)).body)
     assert spec.getattribute("stratus:samples") == 6 and spec.getattribute("stratus:partial") == 0
+    assert not [attribute.name for attribute in spec.extra_attribs if "illuminance" in attribute.name]  # they would be the slab's
     error = layer(pixels, spec, "standard_error")
     assert numpy.isfinite(error).all() and (error >= 0).all() and error.mean() > 0
     _, spec = read_image(daemon.render(scene_of()).body)
@@ -95,6 +96,7 @@ def test_partial_at_the_deadline(daemon, read_image):
     long = scene_of({"samples": 65536}, width=64, height=48)
     assert daemon.render(long, X_Timeout_Ms="1500").status == 504
     long["model"]["partial"] = True
+    assert daemon.render(long, X_Timeout_Ms="1").status == 504  # no pixel has a sample yet
     answer = daemon.render(long, X_Timeout_Ms="8000")
     assert answer.status == 200 and answer.headers["Stratus-Partial"] == "true" and answer.headers["ETag"] is None
     _, spec = read_image(answer.body)

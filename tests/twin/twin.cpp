@@ -68,10 +68,23 @@ static const float *sun_disc_weights;
 #define TWIN_BLOCK(X)                                                                                                                      \
 	X(sun_direction)                                                                                                                   \
 	X(sun_at_camera)                                                                                                                   \
-	X(solar_irradiance) X(rayleigh) X(aerosol) X(aerosol_shape) X(ozone) X(ground_albedo) X(ground_patch) X(ground_mean_albedo)        \
-		X(camera_position) X(camera_right) X(camera_up) X(camera_forward) X(image_size) X(sun_disc_box) X(cloud_layer)             \
-			X(cloud_drift) X(extinction) X(extinction_modified) X(air_below) X(air_around) X(band_red) X(band_green)           \
-				X(band_blue) X(sky_irradiance_ground)
+	X(solar_irradiance)                                                                                                                \
+	X(rayleigh)                                                                                                                        \
+	X(aerosol)                                                                                                                         \
+	X(aerosol_shape)                                                                                                                   \
+	X(ozone)                                                                                                                           \
+	X(ground_albedo)                                                                                                                   \
+	X(ground_patch)                                                                                                                    \
+	X(ground_mean_albedo)                                                                                                              \
+	X(camera_position)                                                                                                                 \
+	X(camera_right)                                                                                                                    \
+	X(camera_up)                                                                                                                       \
+	X(camera_forward)                                                                                                                  \
+	X(image_size)                                                                                                                      \
+	X(sun_disc_box)                                                                                                                    \
+	X(cloud_layer)                                                                                                                     \
+	X(cloud_drift)                                                                                                                     \
+	X(extinction) X(extinction_modified) X(air_below) X(air_around) X(band_red) X(band_green) X(band_blue) X(sky_irradiance_ground)
 #define TWIN_MEMBER(name) static vec4 name;
 TWIN_BLOCK(TWIN_MEMBER)
 #undef TWIN_MEMBER

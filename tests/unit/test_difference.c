@@ -143,15 +143,28 @@ static void paint(painter *of, unsigned char codes[3 * SIDE * SIDE])
 		of(i % SIDE, i / SIDE, codes + 3 * i);
 }
 
+static bool go_on(void *context)
+{
+	(void)context;
+	return false;
+}
+
+/* Says so from the n-th time on. */
+static bool count_down(void *context)
+{
+	int *left = context;
+	return --*left < 0;
+}
+
 static void flip_of(painter *first, painter *second, double per_degree, float map[SIDE * SIDE])
 {
 	static unsigned char a[3 * SIDE * SIDE], b[3 * SIDE * SIDE];
 	struct flip_picture truth, picture;
 	paint(first, a);
 	paint(second, b);
-	assert_true(flip_picture_init(&truth, a, SIDE, SIDE, per_degree));
-	assert_true(flip_picture_init(&picture, b, SIDE, SIDE, per_degree));
-	flip_compare(&truth, &picture, map);
+	assert_true(flip_picture_init(&truth, a, SIDE, SIDE, per_degree, go_on, NULL));
+	assert_true(flip_picture_init(&picture, b, SIDE, SIDE, per_degree, go_on, NULL));
+	flip_compare(&truth, &picture, 0, SIDE * SIDE, map);
 	flip_picture_finish(&truth);
 	flip_picture_finish(&picture);
 }
@@ -217,6 +230,23 @@ static void test_flip_of_flat_pictures(void **state)
 		assert_true(fabs((double)map[i] - expected) < 2e-4);
 	flip_of(green, blue, FLIP_PIXELS_PER_DEGREE, map);
 	assert_true(fabs((double)map[0] - 1) < 2e-4);
+}
+
+/* Wherever it is given up, it says so; it is asked in all of its steps. */
+static void test_flip_is_given_up(void **state)
+{
+	(void)state;
+	static unsigned char codes[3 * SIDE * SIDE];
+	struct flip_picture picture;
+	int asked = 0;
+	paint(grey, codes);
+	for (bool done = false; !done; asked++) {
+		int left = asked;
+		done = flip_picture_init(&picture, codes, SIDE, SIDE, 20, count_down, &left);
+		flip_picture_finish(&picture);
+		assert_true(done == (left >= 0));
+	}
+	assert_in_range(asked, 12, 100);
 }
 
 static void test_flip_is_symmetric(void **state)
@@ -300,6 +330,7 @@ int main(void)
 		cmocka_unit_test(test_no_more_is_taken_out_than_there_is),
 		cmocka_unit_test(test_develop_codes),
 		cmocka_unit_test(test_flip_of_flat_pictures),
+		cmocka_unit_test(test_flip_is_given_up),
 		cmocka_unit_test(test_flip_is_symmetric),
 		cmocka_unit_test(test_flip_blurs_what_is_far),
 		cmocka_unit_test(test_flip_sees_points),

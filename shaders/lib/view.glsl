@@ -217,18 +217,6 @@ view_orders view_orders_of(view_point p, float m_l, float m_v, float thickness, 
 	return orders;
 }
 
-#if VIEW_ABOVE
-// Cosine of light to the facet that is seen. One turned away from the view is none: on a crest, what is seen is turned as little as it takes for the ray to graze it.
-float view_crest_lit_cosine(view_point p)
-{
-	const float GRAZING = 0.0;
-	float away = min(p.mu_v_facet, GRAZING);
-	float forward = 1.0 - 2.0 * p.half_angle.x * p.half_angle.x;
-	float mu = (p.mu_l_facet + away * forward) * inversesqrt(max(1.0 - away * away, 1e-4));
-	return p.mu_v_facet < GRAZING ? mu : p.mu_l_facet;
-}
-#endif
-
 // Light of the sun, of irradiance `sun` normal to its beam, that one lit side of the layer, base or top, sends to the viewer.
 void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 {
@@ -242,9 +230,8 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 #if VIEW_ABOVE
 	if (!through) {
 		// A facet turned away from light is faded out instead of cut. One turned away from the view is not seen: what says so is the crest that a pixel is on.
-		float mu_l_facet = view_crest_lit_cosine(p);
-		facing = smoothstep(-0.05, 0.15, mu_l_facet) * p.lit;
-		m_l = max(mu_l_facet, 0.03);
+		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * p.lit;
+		m_l = max(p.mu_l_facet, 0.03);
 		m_v = max(p.mu_v_facet, 0.1);
 		thickness = p.way * m_v;
 		received = p.received;

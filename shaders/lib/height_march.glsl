@@ -169,6 +169,9 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 	// Distances are means over the outermost droplets: further in, a ray through a crest would find the side behind.
 	float outer = 1.0;
 	vec2 outer_weight = vec2(0.0);
+	// Of several crests behind the first the one that is seen most has the distance: a strip of a flank that is hidden but for it shall not stand for all.
+	vec2 most = vec2(0.0);
+	vec3 crest = vec3(0.0); // of this one: sums for the mean distance, how much is seen
 	for (int approach = 0; approach < HEIGHT_APPROACHES; approach++) {
 		if (path.clear < HEIGHT_OPAQUE)
 			break;
@@ -205,14 +208,10 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 					highest = 0.0;
 					passed = 1.0;
 				} else if (passed > 0.0) {
-					// The next crest. Of one that was hardly seen nothing is kept.
 					passed = 0.0;
 					behind = path.weight.x > HEIGHT_HARDLY;
-					bool again = (behind ? path.weight.y : path.weight.x) <= HEIGHT_HARDLY;
-					vec2 kept = again ? (behind ? vec2(1.0, 0.0) : vec2(0.0)) : vec2(1.0);
-					path.distance *= kept;
-					outer_weight *= kept;
-					outer = again ? 1.0 : outer;
+					outer = 1.0;
+					crest = vec3(0.0);
 				}
 				highest = max(highest, inside);
 				float seen = min(path.clear * inside * height_scattered(extinction_scaled.y * length_m),
@@ -224,8 +223,11 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 				vec2 to_which = behind ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 				path.weight += seen * to_which;
 				path.clear -= seen;
-				path.distance += outermost * inside * middle * to_which;
-				outer_weight += outermost * inside * to_which;
+				crest += vec3(outermost * inside * middle, outermost * inside, seen);
+				vec2 which = crest.z > dot(most, to_which) ? to_which : vec2(0.0);
+				path.distance = mix(path.distance, vec2(crest.x), which);
+				outer_weight = mix(outer_weight, vec2(crest.y), which);
+				most = mix(most, vec2(crest.z), which);
 				outer -= outermost;
 			}
 			before = t;
@@ -242,8 +244,9 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 		// Out of steps, which happens far away along the tops: where there are any, there is always another cloud.
 		vec2 to_which = path.weight.x > HEIGHT_HARDLY ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 		path.weight += path.clear * to_which;
-		path.distance += 1e-3 * t * to_which;
-		outer_weight += 1e-3 * to_which;
+		vec2 which = path.clear > dot(most, to_which) ? to_which : vec2(0.0);
+		path.distance = mix(path.distance, vec2(t), which);
+		outer_weight = mix(outer_weight, vec2(1.0), which);
 		path.clear = 0.0;
 	}
 	path.distance /= max(outer_weight, vec2(1e-12));

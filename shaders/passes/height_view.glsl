@@ -11,6 +11,22 @@ uniform sampler2D height_start;
 // Height over which shadows end, a metre of what a pixel covers.
 const float HEIGHT_SHADOW_SOFT = 0.3;
 
+// Least cosine of the view to what is seen; as shaders/lib/view.glsl bounds it.
+const float HEIGHT_GRAZING = 0.1;
+
+// Slope of what is seen. What is turned away from the view is not: on a crest, that is the part which is turned just so far that the ray grazes it. Without this, single
+// pixels there would show the light of hidden flanks, and towards a low sun, of facets that are visible and lit at once, which hardly any can be.
+vec2 height_slope_seen(vec2 slope, vec3 direction, float t)
+{
+	vec3 normal = normalize(vec3(-slope, 1.0));
+	// Against the vertical there, which turns with the distance.
+	vec3 view = normalize(vec3(-vec2(direction), max(-direction.z - t / EARTH_RADIUS, 0.0)));
+	float mu_v = dot(normal, view);
+	vec3 along = (normal - mu_v * view) * inversesqrt(max(1.0 - mu_v * mu_v, 1e-6));
+	vec3 seen = along * sqrt(1.0 - HEIGHT_GRAZING * HEIGHT_GRAZING) + HEIGHT_GRAZING * view;
+	return mu_v < HEIGHT_GRAZING ? -vec2(seen) / max(seen.z, 0.1) : slope;
+}
+
 struct height_surface {
 	vec4 place; // as stored in 0, distance first
 	vec4 light; // as stored in 1
@@ -25,21 +41,24 @@ height_surface height_surface_at(vec3 direction, float t)
 	float shadow_edge = HEIGHT_SHADOW_SOFT * footprint;
 	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
 	vec4 light = textureLod(height_light, uv, max(log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z), 0.0));
+	vec2 slope = vec2(light);
 	float received = light.w;
 #if HEIGHT_NEAR
 	float scale = height_puff_scale(height);
 	vec4 puff = height_puff(place - vec2(cloud_drift.x, cloud_drift.y), height_of_ray(direction.z, t), max(footprint, HEIGHT_PUFF_FINEST));
 	// The surface bulges on flanks, too.
-	vec2 slope = (vec2(light) + scale * vec2(puff.y, puff.z)) / max(1.0 - scale * puff.w, 0.4) - vec2(light);
-	light += vec4(slope, 0.0, 0.0);
+	slope = (slope + scale * vec2(puff.y, puff.z)) / max(1.0 - scale * puff.w, 0.4);
 	height += scale * puff.x;
-	// Of the light that is scattered often, creases get less, and slopes as they face the sun.
-	float facing = 1.0 - 0.3 * dot(slope, height_sun_heading()) / max(height_sun_rise(), 0.3);
-	received *= clamp(facing, 0.6, 1.5) * (1.0 + 0.75 * puff.x * scale / (scale + 30.0));
+	// Of the light that is scattered often, creases get less.
+	received *= 1.0 + 0.75 * puff.x * scale / (scale + 30.0);
 #endif
+	slope = height_slope_seen(slope, direction, t);
+	// Slopes get it as they face the sun.
+	float facing = 1.0 - 0.3 * dot(slope - vec2(light), height_sun_heading()) / max(height_sun_rise(), 0.3);
+	received *= clamp(facing, 0.6, 1.5);
 	height_surface at;
 	at.place = vec4(t, 0.0, height, height_smooth(place, footprint));
-	at.light = vec4(light.x, light.y, height_sunlit(height, light.z, shadow_edge), received);
+	at.light = vec4(slope, height_sunlit(height, light.z, shadow_edge), received);
 	return at;
 }
 

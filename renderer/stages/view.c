@@ -4,6 +4,7 @@
 #include "renderer/stages/colour.h"
 #include "renderer/stages/view_mesh.h"
 
+#include <epoxy/gl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -417,15 +418,31 @@ static bool see_rows(struct view_stage *stage, struct stage_context *context, co
 	return ok;
 }
 
-/* Rows of one view, as many at a time as is held of what they see of the layer below the camera. */
+/* Pixels between two questions whether to go on: a second at most, of one layer or of many, in software. Smaller pictures run as one, and
+ * so do those on the mesh of view_up, which is laid over all rows at once and quick. */
+enum { ASK_PIXELS = 1 << 20 };
+
+/* Waits for what was drawn, since the driver takes commands faster than it carries them out. */
+static bool is_given_up(const struct view_stage *stage)
+{
+	if (!stage->cancelled)
+		return false;
+	glFinish();
+	return stage->cancelled(stage->cancel_context);
+}
+
+/* Rows of one view, as many at a time as are drawn without asking, or as is held of what they see of the layer below the camera. */
 static bool run_view(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
 		     const struct camera_view *view, struct view_variant variant, struct pass_run *run, struct up_runs *up)
 {
 	struct height_view *seen = variant.side == VIEW_ABOVE ? inputs->seen : NULL;
 	const bool rare = is_rare(&variant), in_parts = seen && seen->place.height < scene->output.height;
-	const int last = view->first_row + view->height;
+	const int last = view->first_row + view->height, some = up ? view->height : ASK_PIXELS / run->width;
 	for (int first = view->first_row, end; first < last; first = end) {
-		end = in_parts && first + seen->place.height < last ? first + seen->place.height : last;
+		const int held = in_parts && seen->place.height < some ? seen->place.height : some;
+		end = first + held < last ? first + held : last;
+		if (first > view->first_row && is_given_up(stage))
+			return false;
 		if (in_parts) {
 			seen->first_row = first;
 			if (!see_rows(stage, context, scene, view, inputs->field, rare, first, end, seen))
@@ -593,6 +610,8 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	if (missing_count == 0)
 		return true;
 	context->reused = false;
+	stage->cancelled = cancelled;
+	stage->cancel_context = cancel_context;
 	struct height_view seen = {0};
 	struct view_inputs with_seen = *inputs;
 	with_seen.seen = &seen;

@@ -43,9 +43,11 @@ struct view_stage {
 	struct view_up_stage up;
 	struct height_view_stage height;
 	struct view_samples_stage samples;
-	struct pass *develop[2]; /* into codes of 16 and of 8 bits */
-	struct texture spare;    /* of a picture that was dropped, to be used again; may be none */
-	struct disc_buffer disc; /* of the last picture made */
+	struct pass *develop[2];       /* into codes of 16 and of 8 bits */
+	struct texture spare;          /* of a picture that was dropped, to be used again; may be none */
+	struct disc_buffer disc;       /* of the last picture made */
+	renderer_cancelled *cancelled; /* of the picture being made; may be NULL */
+	void *cancel_context;
 };
 
 struct view_inputs {

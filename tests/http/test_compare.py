@@ -353,6 +353,17 @@ def test_deadline_while_comparing(daemon, large, share):
     assert took < max(300, 0.25 * large["compare"])
 
 
+def test_deadline_while_drawing(daemon):
+    """The slab's layers of so many pixels are not drawn at one go."""
+    body = {"scene": {"output": {"width": 4096, "height": 2048}}, "variants": PAPER}
+    whole = compare(daemon, body, X_Timeout_Ms="120000").timing["view"]
+    other = {**body, "scene": {**body["scene"], "clouds": {"seed": 5}}}  # nothing of it is remembered
+    began = time.monotonic()
+    assert compare(daemon, other, X_Timeout_Ms="200").status == 504
+    # The sky and the field, which are not drawn in parts, and a part of the view.
+    assert time.monotonic() - began < 1.5 + 0.3 * float(whole["dur"]) / 1000
+
+
 def test_leaving_while_comparing(daemon, large):
     ended = 'stratus_renders_ended_total{reason="abandoned"}'
     before = daemon.metric(ended)

@@ -232,6 +232,9 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			}
 			before = t;
 			gap_before = gap;
+			// Out of steps: on from here, lest a surface that the next one would meet is passed.
+			if (i == HEIGHT_STEPS - 1 && room <= 0.0)
+				break;
 			// High above: back to hops, from no farther than is known to be empty.
 			stride = room > 0.0 ? min(stride, finest) : stride;
 			// The last sample is at the end itself.
@@ -244,7 +247,7 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 		// Out of steps, which happens far away along the tops: where there are any, there is always another cloud.
 		vec2 to_which = path.weight.x > HEIGHT_HARDLY ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 		path.weight += path.clear * to_which;
-		vec2 which = path.clear > dot(most, to_which) ? to_which : vec2(0.0);
+		vec2 which = dot(most, to_which) <= HEIGHT_HARDLY ? to_which : vec2(0.0);
 		path.distance = mix(path.distance, vec2(t), which);
 		outer_weight = mix(outer_weight, vec2(1.0), which);
 		path.clear = 0.0;

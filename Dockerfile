@@ -23,7 +23,7 @@ RUN apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-ins
 COPY --from=build /out/usr/local/ /usr/local/
 COPY --from=build /src/LICENSE /usr/share/doc/stratus/
 
-ARG VERSION=0.3.0
+ARG VERSION=0.4.0
 ARG REVISION=
 ARG CREATED=
 LABEL org.opencontainers.image.title="stratus" \

@@ -5,7 +5,7 @@
 #include <getopt.h>
 #include <stdbool.h>
 
-#define CLIENT_VERSION "0.3.0"
+#define CLIENT_VERSION "0.4.0"
 
 enum client_exit {
 	CLIENT_OK = 0,

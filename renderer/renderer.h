@@ -13,7 +13,7 @@
 #include <stddef.h>
 
 /* Changes whenever the same scene may give other pixels. Part of every ETag. */
-#define RENDERER_VERSION "0.3.0"
+#define RENDERER_VERSION "0.4.0"
 
 enum pass_kind { PASS_AUTO, PASS_FRAGMENT, PASS_COMPUTE };
 

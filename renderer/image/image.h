@@ -15,7 +15,7 @@
 struct image_metadata {
 	const char *scene_json; /* canonical scene, kept as "stratus:scene"; never NULL */
 	const char *request_id; /* or NULL; not written to files (same scene, same bytes), for the log only */
-	const char *software;   /* "stratus 0.3.0" */
+	const char *software;   /* "stratus 0.4.0" */
 	const char *comparison; /* figures of a comparison, JSON, kept as "stratus:comparison"; NULL: it is none */
 };
 

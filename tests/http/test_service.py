@@ -483,7 +483,7 @@ def test_metrics_form(daemon):
     answer = daemon.get("/metrics")
     assert answer.headers["Content-Type"].startswith("application/openmetrics-text")
     samples = parse_metrics(answer.body.decode())
-    assert samples['stratus_build_info{version="0.3.0"}'] == 1
+    assert samples['stratus_build_info{version="0.4.0"}'] == 1
     assert any(name.startswith("stratus_gl_info{vendor=") for name in samples)
     assert samples["stratus_process_resident_memory_bytes"] > 1e6
     assert samples["stratus_queue_depth"] >= 0

@@ -14,30 +14,22 @@ enum { GROUP_SIDE = 8 };
 struct pass {
 	GLuint program;
 	GLuint framebuffer, vertex_array; /* fragment passes alone */
-	GLuint corners, triangles;        /* buffers, over meshes alone */
 	int outputs;
-	bool compute, mesh, adds;
-	GLint arguments, size; /* size: of compute passes, and of those over meshes */
+	bool compute, adds;
+	GLint arguments, size; /* size: of compute passes */
 	char name[64];
 };
 
-/* One triangle over all; or the corners of a mesh, whose positions are in pixels. Both hand on the scene block. */
-static void append_vertex_wrapper(struct source *source, bool mesh)
+/* One triangle over all, which hands on the scene block. */
+static void append_vertex_wrapper(struct source *source)
 {
-	source_print(source, "void scene_hand_on();\n");
-	if (mesh)
-		source_print(source, "#define MESH_VARYING noperspective out\nlayout(location = 0) in vec2 corner_at;\n"
-				     "uniform ivec4 pass_size; // of the targets\nvoid corner(vec2 at);\n"
-				     "void main() {\n\tscene_hand_on();\n\tcorner(corner_at);\n"
-				     "\tgl_Position = vec4(2.0 * corner_at / vec2(pass_size.xy) - 1.0, 0.0, 1.0);\n}\n");
-	else
-		source_print(source, "void main() {\n\tscene_hand_on();\n"
-				     "\tgl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);\n}\n");
+	source_print(source, "void scene_hand_on();\n"
+			     "void main() {\n\tscene_hand_on();\n"
+			     "\tgl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);\n}\n");
 }
 
 static void append_fragment_wrapper(struct source *source, int outputs)
 {
-	source_print(source, "#define MESH_VARYING noperspective in\n");
 	source_print(source, "#define STORE(i, value) output_##i = (value)\n");
 	for (int i = 0; i < outputs; i++)
 		source_print(source, "layout(location = %d) out vec4 output_%d;\n", i, i);
@@ -46,9 +38,9 @@ static void append_fragment_wrapper(struct source *source, int outputs)
 
 static void append_compute_wrapper(struct source *source, int outputs, bool adds)
 {
-	static const char at[] = "ivec2(gl_GlobalInvocationID.xy) + pass_size.wz";
+	static const char at[] = "ivec2(gl_GlobalInvocationID.xy) + ivec2(0, pass_size.z)";
 	source_print(source, "layout(local_size_x = %d, local_size_y = %d) in;\n", GROUP_SIDE, GROUP_SIDE);
-	source_print(source, "uniform ivec4 pass_size; // columns, rows, first row, first column\n");
+	source_print(source, "uniform ivec4 pass_size; // columns, rows, first row\n");
 	if (adds)
 		source_print(source, "#define STORE(i, value) imageStore(output_##i, %s, imageLoad(output_##i, %s) + (value))\n", at, at);
 	else
@@ -57,7 +49,7 @@ static void append_compute_wrapper(struct source *source, int outputs, bool adds
 		source_print(source, "layout(binding = %d%s uniform image2D output_%d;\n", i, adds ? ", rgba32f)" : ") writeonly", i);
 	source_print(source, "void pass(ivec2 pixel);\nvoid main() {\n"
 			     "\tivec2 pixel = ivec2(gl_GlobalInvocationID.xy);\n"
-			     "\tif (all(lessThan(pixel, pass_size.xy))) pass(pixel + pass_size.wz);\n}\n");
+			     "\tif (all(lessThan(pixel, pass_size.xy))) pass(pixel + ivec2(0, pass_size.z));\n}\n");
 }
 
 static bool assemble(struct source *source, const struct pass_compiler *compiler, const struct pass_desc *desc, GLenum type)
@@ -71,11 +63,10 @@ static bool assemble(struct source *source, const struct pass_compiler *compiler
 	if (type == GL_COMPUTE_SHADER)
 		append_compute_wrapper(source, desc->outputs, desc->adds);
 	else if (type == GL_VERTEX_SHADER)
-		append_vertex_wrapper(source, desc->mesh);
+		append_vertex_wrapper(source);
 	else
 		append_fragment_wrapper(source, desc->outputs);
-	return source_include(source, compiler->shader_dir,
-			      type == GL_VERTEX_SHADER && !desc->mesh ? "shaders/lib/scene_block.glsl" : desc->file);
+	return source_include(source, compiler->shader_dir, type == GL_VERTEX_SHADER ? "shaders/lib/scene_block.glsl" : desc->file);
 }
 
 /* The info log is read whether or not it failed: warnings belong into the log too. */
@@ -142,17 +133,6 @@ static void look_up_uniforms(struct pass *pass, const struct pass_desc *desc)
 	}
 }
 
-static void create_mesh_buffers(struct pass *pass)
-{
-	glCreateBuffers(1, &pass->corners);
-	glCreateBuffers(1, &pass->triangles);
-	glVertexArrayVertexBuffer(pass->vertex_array, 0, pass->corners, 0, 2 * sizeof(GLfloat));
-	glVertexArrayElementBuffer(pass->vertex_array, pass->triangles);
-	glVertexArrayAttribFormat(pass->vertex_array, 0, 2, GL_FLOAT, GL_FALSE, 0);
-	glVertexArrayAttribBinding(pass->vertex_array, 0, 0);
-	glEnableVertexArrayAttrib(pass->vertex_array, 0);
-}
-
 struct pass *pass_create(const struct pass_compiler *compiler, const struct pass_desc *desc)
 {
 	struct source source = {0}, vertices = {0};
@@ -162,8 +142,7 @@ struct pass *pass_create(const struct pass_compiler *compiler, const struct pass
 	snprintf(pass->name, sizeof pass->name, "%s", desc->file);
 	pass->outputs = desc->outputs;
 	pass->adds = desc->adds;
-	pass->mesh = desc->mesh;
-	pass->compute = !desc->mesh && (compiler->kind == PASS_COMPUTE || desc->outputs == 0);
+	pass->compute = compiler->kind == PASS_COMPUTE || desc->outputs == 0;
 	if (!assemble(&source, compiler, desc, pass->compute ? GL_COMPUTE_SHADER : GL_FRAGMENT_SHADER) ||
 	    (!pass->compute && !assemble(&vertices, compiler, desc, GL_VERTEX_SHADER)) || !link(pass, source.text, vertices.text))
 		goto fail;
@@ -172,8 +151,6 @@ struct pass *pass_create(const struct pass_compiler *compiler, const struct pass
 		glCreateFramebuffers(1, &pass->framebuffer);
 		glCreateVertexArrays(1, &pass->vertex_array);
 	}
-	if (pass->mesh)
-		create_mesh_buffers(pass);
 	source_finish(&source);
 	source_finish(&vertices);
 	return pass;
@@ -189,10 +166,6 @@ void pass_destroy(struct pass *pass)
 {
 	if (!pass)
 		return;
-	if (pass->mesh) {
-		glDeleteBuffers(1, &pass->corners);
-		glDeleteBuffers(1, &pass->triangles);
-	}
 	if (pass->vertex_array)
 		glDeleteVertexArrays(1, &pass->vertex_array);
 	if (pass->framebuffer)
@@ -211,38 +184,9 @@ static void run_compute(const struct pass *pass, const struct pass_run *run, int
 				   pass->adds ? GL_READ_WRITE : GL_WRITE_ONLY,
 				   texture_internal_format(target ? target->format : TEXTURE_RGBA32F));
 	}
-	glProgramUniform4i(pass->program, pass->size, width, height, run->first_row, run->first_column);
+	glProgramUniform4i(pass->program, pass->size, width, height, run->first_row, 0);
 	glDispatchCompute((GLuint)(width + GROUP_SIDE - 1) / GROUP_SIDE, (GLuint)(height + GROUP_SIDE - 1) / GROUP_SIDE, 1);
 	glMemoryBarrier(GL_ALL_BARRIER_BITS);
-}
-
-/* Lines of a mesh are few: made anew for each run. false when out of memory. */
-static bool draw_mesh(const struct pass *pass, const struct pass_mesh *mesh)
-{
-	const int columns = mesh->column_count, rows = mesh->row_count;
-	const size_t corner_count = (size_t)columns * (size_t)rows, index_count = 6 * (size_t)(columns - 1) * (size_t)(rows - 1);
-	GLfloat *corners = malloc(corner_count * 2 * sizeof *corners);
-	GLuint *triangles = malloc(index_count * sizeof *triangles), *to = triangles;
-	const bool ok = corners && triangles;
-	for (int y = 0; ok && y < rows; y++)
-		for (int x = 0; x < columns; x++) {
-			const GLuint at = (GLuint)(y * columns + x), below = at + (GLuint)columns;
-			corners[2 * at] = mesh->columns[x];
-			corners[2 * at + 1] = mesh->rows[y];
-			if (x + 1 < columns && y + 1 < rows) {
-				const GLuint cell[] = {at, at + 1, below, below, at + 1, below + 1};
-				memcpy(to, cell, sizeof cell);
-				to += 6;
-			}
-		}
-	if (ok) {
-		glNamedBufferData(pass->corners, (GLsizeiptr)(corner_count * 2 * sizeof *corners), corners, GL_STREAM_DRAW);
-		glNamedBufferData(pass->triangles, (GLsizeiptr)(index_count * sizeof *triangles), triangles, GL_STREAM_DRAW);
-		glDrawElements(GL_TRIANGLES, (GLsizei)index_count, GL_UNSIGNED_INT, NULL);
-	}
-	free(corners);
-	free(triangles);
-	return ok;
 }
 
 static void run_fragment(const struct pass *pass, const struct pass_run *run, int width, int height)
@@ -258,19 +202,15 @@ static void run_fragment(const struct pass *pass, const struct pass_run *run, in
 	}
 	glNamedFramebufferDrawBuffers(pass->framebuffer, pass->outputs, buffers);
 	glBindFramebuffer(GL_DRAW_FRAMEBUFFER, pass->framebuffer);
-	glViewport(0, 0, pass->mesh ? run->targets[0]->width : run->first_column + width,
-		   pass->mesh ? run->targets[0]->height : run->first_row + height);
+	glViewport(0, 0, width, run->first_row + height);
 	glEnable(GL_SCISSOR_TEST);
-	glScissor(run->first_column, run->first_row, width, height);
+	glScissor(0, run->first_row, width, height);
 	glBindVertexArray(pass->vertex_array);
 	if (pass->adds) {
 		glEnable(GL_BLEND);
 		glBlendFunc(GL_ONE, GL_ONE);
 	}
-	if (!pass->mesh)
-		glDrawArrays(GL_TRIANGLES, 0, 3);
-	else if (!draw_mesh(pass, run->mesh))
-		log_error("gl: %s: out of memory", pass->name);
+	glDrawArrays(GL_TRIANGLES, 0, 3);
 	glDisable(GL_BLEND);
 	/* Detached again, so that a texture deleted later is really freed, and none stays attached while it is sampled. */
 	for (int i = 0; i < pass->outputs; i++)
@@ -289,8 +229,6 @@ void pass_run(const struct pass *pass, const struct pass_run *run)
 
 	glPushDebugGroup(GL_DEBUG_SOURCE_APPLICATION, 0, -1, pass->name);
 	glUseProgram(pass->program);
-	if (pass->mesh)
-		glProgramUniform4i(pass->program, pass->size, run->targets[0]->width, run->targets[0]->height, 0, 0);
 	if (pass->arguments >= 0)
 		glProgramUniform4fv(pass->program, pass->arguments, PASS_ARGUMENTS, &run->arguments[0][0]);
 	for (GLuint i = 0; i < PASS_SAMPLERS_MAX; i++)

@@ -17,7 +17,6 @@ enum { PASS_OUTPUTS_MAX = 8, PASS_SAMPLERS_MAX = 16, PASS_ARGUMENTS = 4 };
 
 struct pass_desc {
 	const char *file;                        /* "shaders/passes/NAME.glsl" */
-	bool mesh;                               /* runs over a pass_mesh; always as fragments */
 	const char *defines;                     /* lines of #define, or NULL */
 	int outputs;                             /* 1..PASS_OUTPUTS_MAX; 0 for a pass that writes buffers only (always compute) */
 	const char *samplers[PASS_SAMPLERS_MAX]; /* names, in the order of the textures at pass_run */
@@ -37,20 +36,11 @@ struct pass;
 struct pass *pass_create(const struct pass_compiler *compiler, const struct pass_desc *desc);
 void pass_destroy(struct pass *pass);
 
-/* Lines across the targets, in pixels, ascending: a mesh of cells with corners where they cross. At each corner the file's `void
- * corner(vec2 at)` (with PASS_VERTEX defined) sets what it declares as MESH_VARYING, which `pass` then reads, interpolated over the
- * triangle: linearly, as software renderers do at next to no cost. */
-struct pass_mesh {
-	const float *columns, *rows;
-	int column_count, row_count; /* lines; at least 2 each */
-};
-
 struct pass_run {
 	struct texture *const *targets; /* as many as the pass has outputs, all of one size; NULL after the first: not kept */
 	int level;                      /* of the targets, 0 the largest */
 	int width, height;              /* pixels to run; 0: the size of the targets at that level */
-	int first_row, first_column;    /* where the rows and columns begin */
-	const struct pass_mesh *mesh;   /* of a pass over a mesh, which must cover those pixels that are to be written */
+	int first_row;                  /* where the rows begin */
 	const struct texture *samplers[PASS_SAMPLERS_MAX];
 	float arguments[PASS_ARGUMENTS][4];
 };

@@ -2,7 +2,6 @@
 
 #include "renderer/log.h"
 #include "renderer/stages/colour.h"
-#include "renderer/stages/view_mesh.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -292,68 +291,30 @@ static bool row_has_disc(const struct scene_block *block, bool large, int row)
 	return large || (row >= block->sun_disc_box[1] && row < block->sun_disc_box[1] + block->sun_disc_box[3]);
 }
 
-/* How the rows of a view that look up at the layer are run. */
-struct up_runs {
-	struct pass_run table, mesh; /* as view_up_prepare leaves them */
-};
-
-enum up_kind {
-	UP_FAR = VIEW_UP_FAR,
-	UP_NEAR = VIEW_UP_NEAR,
-	UP_ALONG = VIEW_UP_ALONG,
-	UP_SOME_ALONG = VIEW_UP_SOME_ALONG,
-	UP_MESH_FAR,
-	UP_MESH_NEAR
-};
-
-static enum up_kind up_kind_of(const struct scene_block *block, const struct camera_view *view, struct view_variant variant, int row)
+static enum view_up_reach reach_of(const struct scene_block *block, const struct camera_view *view, struct view_variant variant, int row)
 {
 	double lowest, highest;
 	bound_row(view, row, &lowest, &highest);
-	const bool near = row_is_near(block, view, row);
-	if (variant.packed && !variant.large_sun && view_mesh_shows(view, lowest) && !sees_along(block, lowest))
-		return near ? UP_MESH_NEAR : UP_MESH_FAR;
 	if (view->projection != PROJECTION_FISHEYE && sees_along(block, lowest))
-		return sees_along(block, fmin(highest, 1)) ? UP_ALONG : UP_SOME_ALONG;
-	return near && !row_has_disc(block, variant.large_sun, row) ? UP_NEAR : UP_FAR;
-}
-
-static bool run_up_tables(struct view_stage *stage, struct view_variant variant, struct pass_run *run, enum view_up_reach reach,
-			  const struct view_mesh_part *part)
-{
-	const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, reach, variant.large_sun);
-	if (!pass)
-		return false;
-	run->first_row = part->first_row;
-	run->first_column = part->first_column;
-	run->height = part->end_row - part->first_row;
-	run->width = part->end_column - part->first_column;
-	if (run->width > 0 && run->height > 0)
-		pass_run(pass, run);
-	return true;
+		return sees_along(block, fmin(highest, 1)) ? VIEW_UP_ALONG : VIEW_UP_SOME_ALONG;
+	return row_is_near(block, view, row) && !row_has_disc(block, variant.large_sun, row) ? VIEW_UP_NEAR : VIEW_UP_FAR;
 }
 
 /* Rows [first, end) up at the layer. */
 static bool run_up(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view, struct view_variant variant,
-		   struct up_runs *runs, int first, int end)
+		   struct pass_run *run, int first, int end)
 {
 	for (int next; first < end; first = next) {
-		struct view_mesh_part part = {.first_row = first, .end_column = view->width};
-		const enum up_kind kind = up_kind_of(block, view, variant, first);
+		const enum view_up_reach reach = reach_of(block, view, variant, first);
 		for (next = first + 1; next < end; next++)
-			if (up_kind_of(block, view, variant, next) != kind)
+			if (reach_of(block, view, variant, next) != reach)
 				break;
-		part.end_row = next;
-		const bool mesh = kind == UP_MESH_NEAR || kind == UP_MESH_FAR;
-		if (mesh) {
-			const struct pass *pass = view_up_mesh_pass(&stage->up, kind == UP_MESH_NEAR, (int)block->cloud_field[2]);
-			if (!pass)
-				return false;
-			view_mesh_run(pass, block, view, &runs->mesh, first, next);
-			part = view_mesh_around_sun(block, view, first, next);
-		}
-		if (!run_up_tables(stage, variant, &runs->table, mesh ? VIEW_UP_FAR : (enum view_up_reach)kind, &part))
+		const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, reach, variant.large_sun);
+		if (!pass)
 			return false;
+		run->first_row = first;
+		run->height = next - first;
+		pass_run(pass, run);
 	}
 	return true;
 }
@@ -361,7 +322,7 @@ static bool run_up(struct view_stage *stage, const struct scene_block *block, co
 /* Runs over rows [first, last) of one kind after the other, each with the program made for it. `up`: how those that look up at the layer
  * are run, or NULL for the ordinary program. */
 static bool run_regions(struct view_stage *stage, const struct stage_context *context, const struct camera_view *view, int first, int last,
-			struct view_variant variant, struct pass_run *run, struct up_runs *up)
+			struct view_variant variant, struct pass_run *run, struct pass_run *up)
 {
 	while (first < last) {
 		variant.region = region_of_row(&context->block, view, variant.side, first);
@@ -418,8 +379,7 @@ static bool see_rows(struct view_stage *stage, struct stage_context *context, co
 	return ok;
 }
 
-/* Pixels between two questions whether to go on: a second at most, of one layer or of many, in software. Smaller pictures run as one, and
- * so do those on the mesh of view_up, which is laid over all rows at once and quick. */
+/* Pixels between two questions whether to go on: a second at most, of one layer or of many, in software. Smaller pictures run as one. */
 enum { ASK_PIXELS = 1 << 20 };
 
 /* Waits for what was drawn, since the driver takes commands faster than it carries them out. */
@@ -433,11 +393,11 @@ static bool is_given_up(const struct view_stage *stage)
 
 /* Rows of one view, as many at a time as are drawn without asking, or as is held of what they see of the layer below the camera. */
 static bool run_view(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct view_inputs *inputs,
-		     const struct camera_view *view, struct view_variant variant, struct pass_run *run, struct up_runs *up)
+		     const struct camera_view *view, struct view_variant variant, struct pass_run *run, struct pass_run *up)
 {
 	struct height_view *seen = variant.side == VIEW_ABOVE ? inputs->seen : NULL;
 	const bool rare = is_rare(&variant), in_parts = seen && seen->place.height < scene->output.height;
-	const int last = view->first_row + view->height, some = up ? view->height : ASK_PIXELS / run->width;
+	const int last = view->first_row + view->height, some = ASK_PIXELS / run->width;
 	for (int first = view->first_row, end; first < last; first = end) {
 		const int held = in_parts && seen->place.height < some ? seen->place.height : some;
 		end = first + held < last ? first + held : last;
@@ -460,14 +420,14 @@ static bool run_views(struct view_stage *stage, struct stage_context *context, c
 		      struct view_variant variant, struct view_samples samples, struct pass_run *run)
 {
 	const bool fast = !is_rare(&variant) && variant.side == VIEW_BELOW && variant.shading == SHADING_SOLVED;
-	struct up_runs up = {.table = {.targets = run->targets}, .mesh = {.targets = run->targets, .width = run->targets[0]->width}};
+	struct pass_run up = {.targets = run->targets, .width = run->targets[0]->width};
 	const struct view_up_inputs from = {.droplets = inputs->droplets,
 					    .slab_rows = inputs->slab_rows,
 					    .slab_slices = inputs->slab_slices,
 					    .sky = inputs->sky,
 					    .field = inputs->field,
 					    .light = inputs->light};
-	if (fast && !view_up_prepare(&stage->up, context, scene, &from, &up.table, &up.mesh))
+	if (fast && !view_up_prepare(&stage->up, context, scene, &from, &up))
 		return false;
 	run->width = run->targets[0]->width;
 	for (int i = 0; i < camera_view_count(scene); i++) {

@@ -40,23 +40,6 @@ const struct pass *view_up_pass(struct view_up_stage *stage, enum projection pro
 	return *pass;
 }
 
-const struct pass *view_up_mesh_pass(struct view_up_stage *stage, bool near, int details)
-{
-	struct pass **pass = &stage->mesh[near][details - 1];
-	char defines[512];
-	snprintf(defines, sizeof defines, "%s#define FIELD_PACKED 1\n#define FIELD_DETAILS %d\n%s#define VIEW_PROJECTION 0\n", DEFINES,
-		 details, near ? "#define FIELD_NEAR 1\n" : "");
-	if (!*pass)
-		*pass = pass_create(&stage->compiler,
-				    &(struct pass_desc){.file = "shaders/passes/view_mesh.glsl",
-							.mesh = true,
-							.defines = defines,
-							.outputs = 1,
-							.samplers = {"field_coarse", "field_detail", "smooth_packed", "cloud_received",
-								     "up_sky", "up_air", "up_sun", "up_first", "up_light"}});
-	return *pass;
-}
-
 bool view_up_init(struct view_up_stage *stage, const struct pass_compiler *compiler)
 {
 	stage->compiler = *compiler;
@@ -66,8 +49,7 @@ bool view_up_init(struct view_up_stage *stage, const struct pass_compiler *compi
 		ok = texture_init(&stage->air_tables[i], AIR_WIDTH, AIR_HEIGHT, TEXTURE_RGBA32F, 0);
 	ok = ok && view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_FAR, false) &&
 	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_ALONG, false) &&
-	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_SOME_ALONG, false) && view_up_mesh_pass(stage, false, 1) &&
-	     view_up_mesh_pass(stage, true, 1);
+	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_SOME_ALONG, false);
 	if (!ok)
 		view_up_finish(stage);
 	return ok;
@@ -78,8 +60,6 @@ void view_up_finish(struct view_up_stage *stage)
 	struct pass **look = &stage->look[0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->look / sizeof *look; i++)
 		pass_destroy(look[i]);
-	for (int i = 0; i < 2 * VIEW_UP_DETAILS_MAX; i++)
-		pass_destroy((&stage->mesh[0][0])[i]);
 	for (int i = 0; i < VIEW_UP_AIR_TABLES; i++)
 		texture_finish(&stage->air_tables[i]);
 	texture_finish(&stage->received);
@@ -129,7 +109,7 @@ static struct cache_key light_key(const struct scene *scene)
 }
 
 bool view_up_prepare(struct view_up_stage *stage, struct stage_context *context, const struct scene *scene,
-		     const struct view_up_inputs *inputs, struct pass_run *run, struct pass_run *mesh)
+		     const struct view_up_inputs *inputs, struct pass_run *run)
 {
 	struct cache_key first_key = cache_key_make("up first");
 	const struct cache_key light = light_key(scene);
@@ -157,7 +137,5 @@ bool view_up_prepare(struct view_up_stage *stage, struct stage_context *context,
 	};
 	const size_t count = sizeof samplers / sizeof *samplers;
 	memcpy(run->samplers, samplers, sizeof samplers);
-	memcpy(mesh->samplers, samplers, sizeof samplers);
-	mesh->samplers[3] = inputs->light->cloud_received; /* with its levels */
 	return samplers[count - 2] && samplers[count - 1];
 }

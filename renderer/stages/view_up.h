@@ -9,7 +9,7 @@
 
 #include "renderer/stages/radiosity.h"
 
-enum { VIEW_UP_AIR_TABLES = 3, VIEW_UP_DETAILS_MAX = 3 };
+enum { VIEW_UP_AIR_TABLES = 3 };
 
 /* How far away the layer is in some rows of pixels: anywhere; none is larger than half a texel of the field, nor shows the sun's disc; so
  * low that each, or some, are long strips (FIELD_ALONG_COSINE in shaders/lib/field.glsl). */
@@ -20,7 +20,6 @@ struct view_up_stage {
 	struct pass *air, *first, *light;
 	/* By view_up_pass's arguments; all but those that most pictures need are made when wanted. */
 	struct pass *look[PROJECTION_COUNT][2][VIEW_UP_REACHES][2];
-	struct pass *mesh[2][VIEW_UP_DETAILS_MAX];     /* by view_up_mesh_pass's arguments */
 	struct texture air_tables[VIEW_UP_AIR_TABLES]; /* of the frame in work */
 	struct texture received;                       /* view of radiosity_light.cloud_received */
 };
@@ -37,18 +36,13 @@ struct view_up_inputs {
 bool view_up_init(struct view_up_stage *stage, const struct pass_compiler *compiler);
 void view_up_finish(struct view_up_stage *stage);
 
-/* Makes the tables of a frame, or finds them; the block is uploaded. mesh: for view_up_mesh_pass. false (and a log line) when out of
- * memory. */
+/* Makes the tables of a frame, or finds them; the block is uploaded. false (and a log line) when out of memory. */
 bool view_up_prepare(struct view_up_stage *stage, struct stage_context *context, const struct scene *scene,
-		     const struct view_up_inputs *inputs, struct pass_run *run, struct pass_run *mesh);
+		     const struct view_up_inputs *inputs, struct pass_run *run);
 
 /* The program to run over pixels above the horizon, with the samplers that view_up_prepare left in its run. large_sun: sun_disc.large. NULL
  * after log lines when it does not compile. */
 const struct pass *view_up_pass(struct view_up_stage *stage, enum projection projection, bool packed, enum view_up_reach reach,
 				bool large_sun);
-
-/* The program to run by view_mesh_run over a packed field, with the samplers of the mesh's run. near: none of the pixels is larger than
- * half a texel of the field; details: tiles of detail, from 1. NULL after log lines when it does not compile. */
-const struct pass *view_up_mesh_pass(struct view_up_stage *stage, bool near, int details);
 
 #endif

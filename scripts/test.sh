@@ -18,7 +18,7 @@ count() { # count PASSED FAILED
 run_unit() {
 	local program=$1 output status ok bad
 	echo "== ${program#"$B"/}"
-	output=$(timeout 600 "$program" 2>&1)
+	output=$(timeout 1500 "$program" 2>&1)
 	status=$?
 	if [ $status = 77 ]; then
 		echo "skipped"

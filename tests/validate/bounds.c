@@ -31,7 +31,7 @@ const struct bound bounds[BOUND_COUNT] = {
 	{"the base of that deck likewise", TALLY_DECK_BASE, STATISTIC_WORST, 0.05, 1, "%"},
 	{"both against `ground.json`", TALLY_DECK_REFERENCE, STATISTIC_WORST, 0.05, 1, "%"},
 	{"light on the deck against what leaves it and what the ground takes", TALLY_DECK_BALANCE, STATISTIC_WORST, 0.005, 1, "%"},
-	{"the same with puffs on the tops", TALLY_PUFFED_BALANCE, STATISTIC_WORST, 0.03, 1, "%"},
+	{"the same with puffs on the tops", TALLY_PUFFED_BALANCE, STATISTIC_WORST, 0.005, 1, "%"},
 	{"sky over snow against twice that over water, 30 degrees high", TALLY_WATER_SKY, STATISTIC_WORST, 0.3, 1, "%"},
 	{"new droplets, cold, two threads", TALLY_COLD, STATISTIC_WORST, 250, 2, "ms"},
 	{"the same droplets from disk", TALLY_DISK, STATISTIC_WORST, 10, 2, "ms"},

@@ -180,11 +180,9 @@ static void twin_finish(struct twin *twin)
 			free((void *)twin->texture[i].level[level]);
 }
 
-/* Other samples than the shader's, so that what both say is independent. */
-static void render_by_twin(struct twin *twin, const struct droplet_tables *tables, float *outputs[TWIN_OUTPUTS])
+/* Other samples than the shader's, so that what both say is independent. chains: for as long as the twin. */
+static void render_by_twin(struct twin *twin, const struct droplet_tables *tables, struct path_chains *chains, float *outputs[TWIN_OUTPUTS])
 {
-	struct path_chains *chains = malloc(sizeof *chains);
-	assert_non_null(chains);
 	twin->seed += 1;
 	free((void *)twin->texture[TWIN_CHAINS].level[0]);
 	twin->texture[TWIN_CHAINS].level[0] = &chains->chain[0][0][0][0][0];
@@ -268,7 +266,9 @@ static void shader_and_twin_agree(void **state)
 		run_stages(&pipeline, &scene);
 		render_by_shader(&pipeline, &scene, &picture);
 		twin_init(&twin, &pipeline, &scene);
-		render_by_twin(&twin, pipeline.view.droplets->tables, outputs);
+		struct path_chains *chains = malloc(sizeof *chains);
+		assert_non_null(chains);
+		render_by_twin(&twin, pipeline.view.droplets->tables, chains, outputs);
 		const int quarter = WIDTH * HEIGHT / BLOCKS;
 		for (int i = 0; i <= BLOCKS; i++) {
 			const int first = i < BLOCKS ? i * quarter : 0, end = i < BLOCKS ? first + quarter : WIDTH * HEIGHT;
@@ -293,6 +293,7 @@ static void shader_and_twin_agree(void **state)
 		}
 		twin.texture[TWIN_CHAINS].levels = 0;
 		twin_finish(&twin);
+		free(chains);
 		pipeline_finish(&pipeline);
 	}
 }

@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced by run.sh and demo.sh, which set B, the build folder: starts one daemon and knows when it is ready.
+# Sourced by the scripts that need a daemon, which set B, the build folder: starts one and knows when it is ready.
 
 # daemon_start ADDRESS: starts $B/stratusd. Sets daemon_pid; the daemon's standard output is descriptor 3.
 daemon_start() {
@@ -30,3 +30,21 @@ daemon_stop() {
 	wait "$daemon_pid" 2>/dev/null || true
 	daemon_pid=
 }
+
+# daemon_lend LOG: a daemon on a free port for as long as the script runs, at whose end daemon_tidy is called; clients find it by
+# STRATUS_SERVER. Exits with what the daemon logged when it does not start.
+daemon_lend() {
+	trap 'daemon_stop; daemon_tidy' EXIT
+	trap 'exit 130' INT
+	trap 'exit 143' TERM
+	daemon_start 127.0.0.1:0 2>"$1"
+	if ! daemon_await; then
+		echo "the daemon did not start; its log:" >&2
+		cat "$1" >&2
+		exit 1
+	fi
+	export STRATUS_SERVER=$daemon_url
+}
+
+# What a script leaves to be removed; redefined by those that do.
+daemon_tidy() { :; }

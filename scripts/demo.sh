@@ -5,17 +5,7 @@ B=${1:-build}
 . scripts/daemon.sh
 
 mkdir -p out
-log=out/stratusd.log
-trap daemon_stop EXIT
-trap 'exit 130' INT
-trap 'exit 143' TERM
-daemon_start 127.0.0.1:0 2>"$log"
-if ! daemon_await; then
-	echo "the daemon did not start; its log:" >&2
-	cat "$log" >&2
-	exit 1
-fi
-export STRATUS_SERVER=$daemon_url
+daemon_lend out/stratusd.log
 
 mapfile -t presets < <("$B/stratus" presets -q)
 [ "${#presets[@]}" -ge 4 ] || { echo "the daemon lists ${#presets[@]} presets, four are wanted" >&2; exit 1; }

@@ -7,16 +7,8 @@ shift || true
 
 folder=docs/gallery
 work=$(mktemp -d)
-trap 'daemon_stop; rm -rf "$work"' EXIT
-trap 'exit 130' INT
-trap 'exit 143' TERM
-daemon_start 127.0.0.1:0 2>"$work/log"
-if ! daemon_await; then
-	echo "the daemon did not start; its log:" >&2
-	cat "$work/log" >&2
-	exit 1
-fi
-export STRATUS_SERVER=$daemon_url
+daemon_tidy() { rm -rf "$work"; }
+daemon_lend "$work/log"
 
 trim() { sed 's/^ *//; s/ *$//' <<<"$1"; }
 

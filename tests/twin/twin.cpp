@@ -1,6 +1,8 @@
 extern "C" {
 #include "tests/twin/twin.h"
 }
+#include "tests/unit/glsl_block.h"
+
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -65,33 +67,13 @@ static thread_local vec4 stored[TWIN_OUTPUTS];
 static const float *sun_disc_weights;
 #define STORE(index, value) stored[index] = (value)
 
-#define TWIN_BLOCK(X)                                                                                                                      \
-	X(sun_direction)                                                                                                                   \
-	X(sun_at_camera)                                                                                                                   \
-	X(solar_irradiance)                                                                                                                \
-	X(rayleigh)                                                                                                                        \
-	X(aerosol)                                                                                                                         \
-	X(aerosol_shape)                                                                                                                   \
-	X(ozone)                                                                                                                           \
-	X(ground_albedo)                                                                                                                   \
-	X(ground_patch)                                                                                                                    \
-	X(ground_mean_albedo)                                                                                                              \
-	X(camera_position)                                                                                                                 \
-	X(camera_right)                                                                                                                    \
-	X(camera_up)                                                                                                                       \
-	X(camera_forward)                                                                                                                  \
-	X(image_size)                                                                                                                      \
-	X(sun_disc_box)                                                                                                                    \
-	X(cloud_layer)                                                                                                                     \
-	X(cloud_drift)                                                                                                                     \
-	X(extinction) X(extinction_modified) X(air_below) X(air_around) X(band_red) X(band_green) X(band_blue) X(sky_irradiance_ground)
-#define TWIN_MEMBER(name) static vec4 name;
-TWIN_BLOCK(TWIN_MEMBER)
+#define TWIN_MEMBER(name) [[maybe_unused]] static vec4 name;
+GLSL_BLOCK(TWIN_MEMBER)
 #undef TWIN_MEMBER
 #define TWIN_COPY(name) std::memcpy(&name, block.name, sizeof name);
 static void set_block(const scene_block &block)
 {
-	TWIN_BLOCK(TWIN_COPY)
+	GLSL_BLOCK(TWIN_COPY)
 }
 #undef TWIN_COPY
 

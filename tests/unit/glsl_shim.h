@@ -18,6 +18,7 @@
 #include <glm/glm.hpp>
 
 #include "renderer/scene_block.h"
+#include "tests/unit/glsl_block.h"
 
 #define INOUT(type) type &
 
@@ -179,46 +180,6 @@ static std::vector<float> sun_disc_weights;
 /* Arguments of the pass, and what it stores. */
 static vec4 arguments[4], stored[8];
 #define STORE(index, value) stored[index] = (value)
-
-/* The scene block: one vector per member. */
-#define GLSL_BLOCK(X)                                                                                                                      \
-	X(sun_direction)                                                                                                                   \
-	X(sun_at_camera)                                                                                                                   \
-	X(solar_irradiance)                                                                                                                \
-	X(rayleigh)                                                                                                                        \
-	X(aerosol)                                                                                                                         \
-	X(aerosol_shape)                                                                                                                   \
-	X(ozone)                                                                                                                           \
-	X(ground_albedo)                                                                                                                   \
-	X(ground_patch)                                                                                                                    \
-	X(ground_mean_albedo)                                                                                                              \
-	X(camera_position)                                                                                                                 \
-	X(camera_right)                                                                                                                    \
-	X(camera_up)                                                                                                                       \
-	X(camera_forward)                                                                                                                  \
-	X(image_size)                                                                                                                      \
-	X(sun_disc_box)                                                                                                                    \
-	X(cloud_layer)                                                                                                                     \
-	X(cloud_field)                                                                                                                     \
-	X(cloud_drift)                                                                                                                     \
-	X(cloud_puffs)                                                                                                                     \
-	X(cloud_puffs_drift)                                                                                                               \
-	X(cloud_detail)                                                                                                                    \
-	X(cloud_threshold)                                                                                                                 \
-	X(extinction)                                                                                                                      \
-	X(extinction_modified)                                                                                                             \
-	X(extinction_scaled)                                                                                                               \
-	X(slab_slice_range)                                                                                                                \
-	X(slab_light)                                                                                                                      \
-	X(sky_irradiance_cloud)                                                                                                            \
-	X(sky_irradiance_ground)                                                                                                           \
-	X(air_below)                                                                                                                       \
-	X(air_around)                                                                                                                      \
-	X(band_red)                                                                                                                        \
-	X(band_green)                                                                                                                      \
-	X(band_blue)                                                                                                                       \
-	X(develop)                                                                                                                         \
-	X(sea_state)
 
 #define GLSL_MEMBER(name) static vec4 name;
 GLSL_BLOCK(GLSL_MEMBER)

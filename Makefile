@@ -4,6 +4,7 @@
 # make validate   measures the bounds of optics and radiosity and draws the paper's figures into docs/validation/, some minutes
 # make judge   measures the slab against its reference over 24 scenes and writes docs/judge, some 20 minutes; goes on where it was stopped
 # make gallery   draws the pictures of docs/gallery
+# make fuzz     throws bytes at every reader of what strangers send, FUZZ_SECONDS (600) each; FUZZ="name name" takes these alone
 # make install   puts programs, manual and systemd unit below PREFIX (/usr/local), all below DESTDIR; make uninstall takes them away
 # make image     builds the container image and renders a picture with it
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
@@ -21,7 +22,7 @@ CXX := g++
 OPT ?= -O2 -g
 SANFLAGS := $(if $(SAN),-fsanitize=$(SAN) -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
 CPPFLAGS := -I. -D_GNU_SOURCE -D_FORTIFY_SOURCE=2 -MMD -MP
-CFLAGS = -std=c17 $(OPT) -Wall -Wextra -Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wvla -fstack-protector-strong $(SANFLAGS)
+CFLAGS = -std=c17 $(OPT) -Wall -Wextra -Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wvla -fstack-protector-strong $(SANFLAGS) $(EXTRA_CFLAGS)
 CXXFLAGS := -std=c++17 $(OPT) -Wall -Wextra -Werror $(SANFLAGS)
 LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 
@@ -32,6 +33,7 @@ TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy p
 	python3-prometheus-client mandoc systemd
 VALIDATE_PACKAGES := gnuplot-nox
 GALLERY_PACKAGES := imagemagick
+FUZZ_PACKAGES := clang llvm
 
 pkg = $(shell pkg-config $(1) $(2))
 RENDERER_LIBS = $(call pkg,--libs,epoxy libxxhash cminpack) -lEGL -lm
@@ -54,7 +56,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel man install uninstall image run test demo gallery validate judge unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall image run test fuzz replays demo gallery validate judge unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -147,6 +149,20 @@ $(B)/tests/test_deck: $(call obj,tests/validate/deck.c)
 $(B)/tests/test_exchange: $(call obj,tests/validate/squares.c)
 $(B)/tests/test_sky_light: $(call obj,tests/validate/air_photons.c)
 
+# A fuzz target by itself runs the inputs that were kept (replay); with libFuzzer it looks for more.
+FUZZ_TARGETS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_COMMON := $(call obj,tests/fuzz/scene.c) $(B)/libserver.a $(B)/librenderer.a
+$(B)/fuzz/replay_%: $(B)/tests/fuzz/fuzz_%.c.o $(call obj,tests/fuzz/replay.c) $(FUZZ_COMMON)
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS) $^ -o $@ $(SERVER_LIBS) $(RENDERER_LIBS)
+$(B)/fuzz/fuzz_%: $(B)/tests/fuzz/fuzz_%.c.o $(FUZZ_COMMON)
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS) -fsanitize=fuzzer $^ -o $@ $(SERVER_LIBS) $(RENDERER_LIBS)
+replays: $(addprefix $(B)/fuzz/replay_,$(FUZZ_TARGETS))
+fuzzers: $(addprefix $(B)/fuzz/fuzz_,$(FUZZ_TARGETS))
+.PHONY: fuzzers
+.PRECIOUS: $(B)/tests/fuzz/%.c.o
+
 -include $(shell find $(B) -name '*.d' 2>/dev/null)
 
 # --- manual and installation -------------------------------------------------------------------------------------------------
@@ -195,8 +211,19 @@ demo: packages
 	@scripts/demo.sh $(B)
 
 test: test-packages
-	@$(MAKE) --no-print-directory -j$$(nproc) programs unit && $(MAKE) --no-print-directory kernel
+	@$(MAKE) --no-print-directory -j$$(nproc) programs unit replays && $(MAKE) --no-print-directory kernel
 	@scripts/test.sh $(B)
+
+# The daemon and the fuzzers by clang, the image module as it is delivered: decoders of others are not ours to instrument.
+FUZZ_SECONDS ?= 600
+FUZZ ?= $(FUZZ_TARGETS)
+# clang warns of members left to be zero where gcc does so only without designators.
+FUZZ_BUILD := CC=clang SAN=fuzzer-no-link,address,undefined EXTRA_CFLAGS=-Wno-missing-field-initializers
+fuzz: packages
+	@scripts/packages.sh $(FUZZ_PACKAGES)
+	@$(MAKE) --no-print-directory -j$$(nproc) build/stratus-image.so && $(MAKE) --no-print-directory kernel
+	@$(MAKE) --no-print-directory -j$$(nproc) $(FUZZ_BUILD) fuzzers
+	@scripts/fuzz.sh build/san-fuzzer-no-link-address-undefined/fuzz $(FUZZ_SECONDS) $(FUZZ)
 
 # PICTURES="name name" draws these alone.
 gallery: packages

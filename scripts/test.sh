@@ -14,11 +14,12 @@ count() { # count PASSED FAILED
 	failed=$((failed + $2))
 }
 
-# One unit test program. cmocka's own count where it ended in order, else one failure; 77 means that it cannot run here.
+# One unit test program, with its arguments. cmocka's own count where it ended in order, else one failure; 77 means that it cannot run here.
 run_unit() {
 	local program=$1 output status ok bad
+	shift
 	echo "== ${program#"$B"/}"
-	output=$(timeout 1500 "$program" 2>&1)
+	output=$(timeout 1500 "$program" "$@" 2>&1)
 	status=$?
 	if [ $status = 77 ]; then
 		echo "skipped"
@@ -40,6 +41,14 @@ run_units() {
 	local program
 	for program in "$B"/tests/test_*; do
 		[ -x "$program" ] && [ -f "$program" ] && run_unit "$program"
+	done
+}
+
+# What fuzzing starts from, and what it found once.
+run_replays() {
+	local seeds
+	for seeds in tests/fuzz/seeds/*; do
+		STRATUS_IMAGE_MODULE=$B/stratus-image.so run_unit "$B/fuzz/replay_${seeds##*/}" "$seeds"
 	done
 }
 
@@ -77,7 +86,7 @@ run_format() {
 run_sanitized() {
 	local log=$results/sanitized counts
 	echo "== again with SAN=address,undefined"
-	if make --no-print-directory -j"$(nproc)" SAN=address,undefined programs unit >"$log" 2>&1; then
+	if make --no-print-directory -j"$(nproc)" SAN=address,undefined programs unit replays >"$log" 2>&1; then
 		SAN=address,undefined scripts/test.sh build/san-address-undefined 2>&1 | tee "$log" | sed '$d'
 	else
 		cat "$log"
@@ -100,6 +109,7 @@ if [ -n "$SAN" ]; then
 	keep_modules
 fi
 run_units
+run_replays
 if [ -n "$SAN" ]; then
 	run_pytest tests/http
 else

@@ -53,10 +53,10 @@ static bool set_size(const struct source *source, int64_t width, int64_t height,
 	return true;
 }
 
-static bool check_rows(const struct source *source, const struct picture_file *file, uint64_t bytes_per_pixel, const char *what)
+/* Rows that are decoded together, and how wide a reader makes them. */
+static bool check_rows(const struct source *source, uint64_t width, uint64_t rows, uint64_t bytes_per_pixel, const char *what)
 {
-	const uint64_t rows = (uint64_t)(file->row_block < file->height ? file->row_block : file->height);
-	if (rows * (uint64_t)file->width * bytes_per_pixel <= PICTURE_ROWS_BYTES_MAX)
+	if (rows * width * bytes_per_pixel <= PICTURE_ROWS_BYTES_MAX)
 		return true;
 	return refuse(source, "%s takes more than %d MB to read at its size", what, PICTURE_ROWS_BYTES_MAX >> 20);
 }
@@ -78,7 +78,8 @@ static bool png_read_header(const struct source *source, struct picture_file *fi
 		return false;
 	file->row_block = interlaced ? file->height : 1;
 	/* A transparent colour may add a channel. */
-	return check_rows(source, file, (uint64_t)(channels_of[type] + 1) * (depth == 16 ? 2 : 1), "an interlaced PNG");
+	return check_rows(source, (uint64_t)file->width, (uint64_t)file->row_block,
+			  (uint64_t)(channels_of[type] + 1) * (depth == 16 ? 2 : 1), "an interlaced PNG");
 }
 
 static bool png_is_needed(const unsigned char type[4])
@@ -139,7 +140,8 @@ struct exr_header {
 	unsigned char *bytes;
 	size_t count, at;
 	int64_t width, height;
-	int channels, pixel_bytes, compression, tile_height;
+	uint32_t tile_width, tile_height; /* 0: none */
+	int channels, pixel_bytes, compression;
 };
 
 /* A text that ends with a NUL, at the place that is read; NULL when it does not. */
@@ -184,8 +186,8 @@ static bool exr_read_attribute(const struct source *source, struct exr_header *h
 	} else if (strcmp(name, "compression") == 0 && size == 1) {
 		header->compression = value[0];
 	} else if (strcmp(name, "tiles") == 0 && size == 9) {
-		const uint32_t height = little_endian(value + 4);
-		header->tile_height = height > 0 && height <= INT32_MAX ? (int)height : INT32_MAX;
+		header->tile_width = little_endian(value);
+		header->tile_height = little_endian(value + 4);
 	} else if (strcmp(name, "channels") == 0) {
 		return exr_read_channels(source, header, header->at + size);
 	}
@@ -218,6 +220,23 @@ static int exr_rows_of(int compression)
 	return compression >= 0 && compression < (int)(sizeof rows / sizeof *rows) ? rows[compression] : 0;
 }
 
+static bool exr_has_tiles(const struct exr_header *header)
+{
+	return header->tile_width >= 1 && header->tile_height >= 1 && header->tile_width <= PICTURE_SIDE_MAX &&
+	       header->tile_height <= PICTURE_SIDE_MAX;
+}
+
+/* A block as packed, and four floats a pixel as it is read. Readers make room for whole blocks and tiles, also where they stand out of the
+ * picture. */
+static bool exr_check_rows(const struct source *source, const struct exr_header *header, bool tiled, const struct picture_file *file)
+{
+	uint64_t width = (uint64_t)file->width;
+	if (tiled)
+		width = (width + header->tile_width - 1) / header->tile_width * header->tile_width;
+	return check_rows(source, width, (uint64_t)file->row_block, (uint64_t)header->pixel_bytes + 16,
+			  "an EXR of such channels and tiles");
+}
+
 static bool exr_use_header(const struct source *source, const struct exr_header *header, bool tiled, struct picture_file *file)
 {
 	const int rows = exr_rows_of(header->compression);
@@ -225,12 +244,12 @@ static bool exr_use_header(const struct source *source, const struct exr_header 
 		return refuse(source, "is an EXR without channels");
 	if (!set_size(source, header->width, header->height, file))
 		return false;
-	if (rows == 0 || (tiled && header->tile_height == 0))
-		return refuse(source, "is an EXR whose compression or tiles are unknown");
-	file->row_block = tiled ? header->tile_height : rows;
-	/* As packed, and four floats a pixel as they are read. */
-	return check_rows(source, file, (uint64_t)header->pixel_bytes + 16, "an EXR of such channels and tiles") &&
-	       add_piece(source, file, 0, source->size);
+	if (rows == 0)
+		return refuse(source, "is an EXR of unknown compression");
+	if (tiled && !exr_has_tiles(header))
+		return refuse(source, "is an EXR whose tiles are not from 1 x 1 to %d x %d pixels", PICTURE_SIDE_MAX, PICTURE_SIDE_MAX);
+	file->row_block = tiled ? (int)header->tile_height : rows;
+	return exr_check_rows(source, header, tiled, file) && add_piece(source, file, 0, source->size);
 }
 
 static bool exr_read(const struct source *source, struct picture_file *file)

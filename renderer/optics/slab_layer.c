@@ -208,7 +208,13 @@ __attribute__((target("avx2,fma"))) static bool double_256(struct slab_layer *la
 	return double_layer(layer);
 }
 
-__attribute__((target("avx512f,prefer-vector-width=512"))) static bool double_512(struct slab_layer *layer)
+/* clang knows no preference here. */
+#ifdef __clang__
+#define TARGET_512 "avx512f"
+#else
+#define TARGET_512 "avx512f,prefer-vector-width=512"
+#endif
+__attribute__((target(TARGET_512))) static bool double_512(struct slab_layer *layer)
 {
 	return double_layer(layer);
 }

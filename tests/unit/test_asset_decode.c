@@ -252,6 +252,9 @@ static void test_sizes_that_are_too_large(void **state)
 	assert_refused(exr_begin(1, 0x7fffffff, &floats), "from 1 x 1");
 	assert_refused(exr_begin(0, 1, &floats), "from 1 x 1");
 	assert_refused(exr_begin(8192, 8192, &(struct exr_options){.channels = "BGR", .type = 2, .tile = 8192}), "more than 256 MB");
+	/* A tile is read whole, however little of it is picture. */
+	assert_refused(exr_begin(20, 18, &(struct exr_options){.channels = "BGR", .type = 2, .tile = 8192}), "more than 256 MB");
+	assert_refused(exr_begin(20, 18, &(struct exr_options){.channels = "BGR", .type = 2, .tile = 17760272}), "8192 x 8192");
 }
 
 static void test_kinds_of_exr(void **state)

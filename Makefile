@@ -44,7 +44,7 @@ CLIENT_LIBS = $(call pkg,--libs,libcurl jansson libpng) -lOpenEXRCore
 # renderer/ without its programs and its C++ is one archive; it knows no HTTP, JSON or OpenImageIO (render-bench proves it).
 RENDERER_SRC := $(wildcard renderer/*.c renderer/optics/*.c renderer/gl/*.c renderer/stages/*.c renderer/image/*.c)
 SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c))
-CLIENT_SRC := $(wildcard clients/*.c)
+CLIENT_SRC := $(wildcard clients/*.c clients/bench/*.c)
 UNIT_SRC := $(wildcard tests/unit/test_*.c)
 VALIDATE_SRC := $(wildcard tests/validate/*.c)
 UNIT_CXX := $(wildcard tests/unit/test_*.cpp)
@@ -145,6 +145,7 @@ $(B)/tests/%: tests/unit/%.cpp $(B)/librenderer.a $(SHADERS)
 $(B)/tests/test_reference_layer $(B)/tests/test_reference_twin: $(TWIN_OBJ)
 $(B)/tests/test_reference_layer $(B)/tests/test_reference_twin: RENDERER_LIBS += -lstdc++
 $(B)/tests/test_validate_bounds: $(call obj,tests/validate/bounds.c)
+$(B)/tests/test_histogram: $(call obj,clients/bench/histogram.c)
 $(B)/tests/test_deck: $(call obj,tests/validate/deck.c)
 $(B)/tests/test_exchange: $(call obj,tests/validate/squares.c)
 $(B)/tests/test_sky_light: $(call obj,tests/validate/air_photons.c)

@@ -10,5 +10,6 @@ extern const struct command command_asset;
 extern const struct command command_presets;
 extern const struct command command_health;
 extern const struct command command_info;
+extern const struct command command_bench;
 
 #endif

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct command *const commands[] = {
-	&command_render, &command_compare, &command_asset, &command_presets, &command_info, &command_health, NULL};
+static const struct command *const commands[] = {&command_render, &command_compare, &command_asset,  &command_presets,
+						 &command_info,   &command_bench,   &command_health, NULL};
 
 static void print_usage(FILE *to)
 {

@@ -5,6 +5,7 @@
 # make judge   measures the slab against its reference over 24 scenes and writes docs/judge, some 20 minutes; goes on where it was stopped
 # make gallery   draws the pictures of docs/gallery
 # make fuzz     throws bytes at every reader of what strangers send, FUZZ_SECONDS (600) each; FUZZ="name name" takes these alone
+# make load     offers a daemon half of what it can do up to four times as much; three minutes
 # make install   puts programs, manual and systemd unit below PREFIX (/usr/local), all below DESTDIR; make uninstall takes them away
 # make image     builds the container image and renders a picture with it
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
@@ -56,7 +57,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel man install uninstall image run test fuzz replays demo gallery validate judge unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall image run test fuzz replays load demo gallery validate judge unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -225,6 +226,11 @@ fuzz: packages
 	@$(MAKE) --no-print-directory -j$$(nproc) build/stratus-image.so && $(MAKE) --no-print-directory kernel
 	@$(MAKE) --no-print-directory -j$$(nproc) $(FUZZ_BUILD) fuzzers
 	@scripts/fuzz.sh build/san-fuzzer-no-link-address-undefined/fuzz $(FUZZ_SECONDS) $(FUZZ)
+
+load: packages
+	@scripts/packages.sh python3
+	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
+	@scripts/load.sh $(B)
 
 # PICTURES="name name" draws these alone.
 gallery: packages

@@ -1,6 +1,7 @@
 /* stratusd: settings, signals, and the life of the service. */
 #include "renderer/log.h"
 #include "server/config_check.h"
+#include "server/decoder_process.h"
 #include "server/service.h"
 #include "server/supervisor.h"
 
@@ -8,6 +9,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -65,6 +67,8 @@ static void set_log(const struct config *config)
 int main(int argc, char **argv)
 {
 	struct config config;
+	if (argc == 3 && strcmp(argv[1], DECODER_PROCESS_FLAG) == 0)
+		return decoder_process_main(argv[2]);
 	switch (config_parse(argc, argv, &config)) {
 	case CONFIG_DONE:
 		return EXIT_SUCCESS;

@@ -286,8 +286,8 @@ static void decode(struct work *base)
 	struct service *service = work->request->service;
 	run->job.waited_ms += clock_now_ms() - run->decoding_since_ms;
 	run->job.outcome = RENDER_OUTCOME_FAILED;
-	if (render_job_is_over(&run->job) ||
-	    !scene_assets_decode(service->maps, service->images, run->scene, &run->assets, job_is_over, &run->job, run->decode_ms)) {
+	if (render_job_is_over(&run->job) || !scene_assets_decode(service->maps, service->decoder, run->scene, &run->assets, job_is_over,
+								  &run->job, run->job.deadline_ms, run->decode_ms)) {
 		work->ended = &run->job;
 		hand_back(work);
 	} else if (!push(work, run)) {

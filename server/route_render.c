@@ -248,8 +248,8 @@ static void decode(struct work *base)
 	struct service *service = work->request->service;
 	work->job.waited_ms += clock_now_ms() - work->decoding_since_ms;
 	work->job.outcome = RENDER_OUTCOME_FAILED;
-	if (render_job_is_over(&work->job) ||
-	    !scene_assets_decode(service->maps, service->images, &work->input.scene, &work->assets, is_over, &work->job, work->decode_ms))
+	if (render_job_is_over(&work->job) || !scene_assets_decode(service->maps, service->decoder, &work->input.scene, &work->assets,
+								   is_over, &work->job, work->job.deadline_ms, work->decode_ms))
 		call_end_render(work->request, &work->job);
 	else if (!preparation_push(service->preparation, &work->job))
 		refuse(work);

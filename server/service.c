@@ -74,7 +74,8 @@ static bool open_assets(struct service *service)
 					    .count = (size_t)config->asset_count};
 	service->assets = asset_store_create(config->state_dir, &limits);
 	service->maps = asset_maps_create((size_t)config->assets_mb << 20);
-	return service->assets && service->maps;
+	service->decoder = decoder_create(config->image_module, &decoder_default_limits);
+	return service->assets && service->maps && service->decoder;
 }
 
 struct service *service_create(const struct config *config)
@@ -161,6 +162,7 @@ void service_destroy(struct service *service)
 	worker_pool_destroy(service->computers);
 	worker_pool_destroy(service->tracers);
 	worker_pool_destroy(service->decoders);
+	decoder_destroy(service->decoder);
 	asset_maps_destroy(service->maps);
 	asset_store_destroy(service->assets);
 	render_queue_destroy(service->queue);

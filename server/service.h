@@ -5,6 +5,7 @@
 #include "renderer/image/image.h"
 #include "server/asset_maps.h"
 #include "server/config.h"
+#include "server/decoder.h"
 #include "server/metrics.h"
 #include "server/preparation.h"
 #include "server/render_queue.h"
@@ -35,9 +36,10 @@ struct service {
 	struct worker_pool *workers;     /* encode images: the render thread waits for them, so nothing slow runs here */
 	struct worker_pool *computers;   /* droplets and layers for their own calls, behind the pictures */
 	struct worker_pool *tracers;     /* one thread that traces photons, on all processors, behind everything else */
-	struct worker_pool *decoders;    /* one thread that reads uploaded pictures, one at a time since each takes memory */
+	struct worker_pool *decoders;    /* one thread that has uploaded pictures read, one at a time since each takes memory */
 	struct asset_store *assets;
 	struct asset_maps *maps;
+	struct decoder *decoder;
 	struct MHD_Daemon *daemon;
 	const struct image_api *images;
 	char *pixel_version; /* everything but the question that decides about an answer's bytes */

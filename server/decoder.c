@@ -225,20 +225,15 @@ static bool receive_reply(const struct decoder *decoder, struct passage *passage
 	return ready > 0 && recv(decoder->socket, &passage->reply, sizeof passage->reply, 0) == (ssize_t)sizeof passage->reply;
 }
 
-/* A process that was killed while it had nothing to do is replaced; one that falls with the picture in its hands is not tried again. */
+/* The process itself reads no picture, so that whatever ended it was not this one: it is replaced, once. */
 static bool exchange(struct decoder *decoder, struct passage *passage)
 {
 	for (int attempt = 0; attempt < 2; attempt++) {
 		if (!start_process(decoder))
 			return false;
-		if (!send_request(decoder, passage)) {
-			end_process(decoder);
-			continue;
-		}
-		if (receive_reply(decoder, passage))
+		if (send_request(decoder, passage) && receive_reply(decoder, passage))
 			return true;
 		end_process(decoder);
-		break;
 	}
 	log_error("decoder: its process did not answer");
 	return false;

@@ -1,5 +1,5 @@
 # syntax=docker/dockerfile:1
-# docker build -t stratus .          docker run -p 8080:8080 stratus          (GPU: --gpus all)
+# docker build -t stratus .          docker run -p 127.0.0.1:8080:8080 stratus          (GPU: --gpus all)
 # The first stage has compilers and makes the Mie kernel table; the second holds what runs.
 
 FROM debian:12-slim AS build
@@ -16,7 +16,7 @@ FROM debian:12-slim
 # libegl1 is libglvnd's: it finds NVIDIA's EGL where the container runtime brings it, else Mesa's.
 RUN apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
 		libepoxy0 libopengl0 libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio2.4 zlib1g \
-		libmicrohttpd12 libjansson4 libnova-0.16-0 libnettle8 libxxhash0 libcminpack1 libcurl4 libpng16-16 libopenexr-3-1-30 ca-certificates \
+		libmicrohttpd12 libgnutls30 libjansson4 libnova-0.16-0 libnettle8 libxxhash0 libcminpack1 libcurl4 libpng16-16 libopenexr-3-1-30 ca-certificates \
 	&& rm -rf /var/lib/apt/lists/* \
 	&& useradd --uid 10001 --user-group --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin stratus \
 	&& install -d -o stratus -g stratus /var/lib/stratus
@@ -34,7 +34,9 @@ LABEL org.opencontainers.image.title="stratus" \
 	org.opencontainers.image.licenses="Apache-2.0" \
 	org.opencontainers.image.base.name="docker.io/library/debian:12-slim"
 
+# The container has a network of its own: who comes in is decided where its port is published.
 ENV STRATUS_LISTEN=0.0.0.0:8080 \
+	STRATUS_ALLOW_ANYONE=1 \
 	STRATUS_STATE_DIR=/var/lib/stratus \
 	STRATUS_LOG_FORMAT=json \
 	NVIDIA_DRIVER_CAPABILITIES=graphics,compute,utility

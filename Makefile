@@ -29,8 +29,8 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 
 # Debian packages: to build and run, and to test. scripts/packages.sh installs those that are missing.
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
-	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
-TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr clang-format procps \
+	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
+TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr openssl clang-format procps \
 	python3-prometheus-client mandoc systemd
 VALIDATE_PACKAGES := gnuplot-nox
 GALLERY_PACKAGES := imagemagick
@@ -38,7 +38,7 @@ FUZZ_PACKAGES := clang llvm
 
 pkg = $(shell pkg-config $(1) $(2))
 RENDERER_LIBS = $(call pkg,--libs,epoxy libxxhash cminpack) -lEGL -lm
-SERVER_LIBS = $(call pkg,--libs,libmicrohttpd jansson nettle) -lnova -ldl
+SERVER_LIBS = $(call pkg,--libs,libmicrohttpd gnutls jansson nettle) -lnova -ldl
 CLIENT_LIBS = $(call pkg,--libs,libcurl jansson libpng) -lOpenEXRCore
 
 # --- what is built from what -------------------------------------------------------------------------------------------------

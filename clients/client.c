@@ -20,6 +20,8 @@ void client_help(const struct command *command)
 	printf("usage: stratus %s [options]%s%s\n\n%s.\n\n%s", command->name, *command->arguments ? " " : "", command->arguments,
 	       command->summary, command->help);
 	fputs("  --server URL       of the daemon (STRATUS_SERVER, else http://127.0.0.1:8080)\n"
+	      "  --key KEY          to show to the daemon (better in STRATUS_API_KEY: others on this machine may see options)\n"
+	      "  --ca-cert FILE     authorities that may vouch for the daemon of an https address (STRATUS_CA_CERT, else the system's)\n"
 	      "  --timeout SECONDS  give up, here and in the daemon, after so long\n"
 	      "  -q, --quiet        errors alone on standard error\n"
 	      "  -h, --help         this text\n",
@@ -43,6 +45,12 @@ int client_option(struct client *client, int option)
 	switch (option) {
 	case 'S':
 		client->server = optarg;
+		return -1;
+	case 'K':
+		client->key = optarg;
+		return -1;
+	case 'C':
+		client->ca_cert = optarg;
 		return -1;
 	case 'T':
 		return set_timeout(client, optarg);

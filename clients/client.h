@@ -18,6 +18,8 @@ enum client_exit {
 struct client {
 	const struct command *command; /* the one that runs */
 	const char *server;            /* URL without a path */
+	const char *key;               /* API key; NULL: none */
+	const char *ca_cert;           /* file of authorities to trust instead of the system's; NULL: those */
 	double timeout_s;              /* 0: none given */
 	bool quiet;
 };
@@ -34,6 +36,7 @@ struct command {
 #define CLIENT_SHORT_OPTIONS "qh"
 #define CLIENT_LONG_OPTIONS                                                                                             \
 	{"server", required_argument, NULL, 'S'}, {"timeout", required_argument, NULL, 'T'},                            \
+	{"key", required_argument, NULL, 'K'}, {"ca-cert", required_argument, NULL, 'C'},                               \
 	{"quiet", no_argument, NULL, 'q'}, {"help", no_argument, NULL, 'h'}
 /* clang-format on */
 

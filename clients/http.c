@@ -54,6 +54,16 @@ static char *join_url(const struct client *client, const char *path)
 	return asprintf(&url, "%.*s%s", (int)length, client->server, path) < 0 ? NULL : url;
 }
 
+static struct curl_slist *append_key(struct curl_slist *headers, const char *key)
+{
+	char *line;
+	if (asprintf(&line, "Authorization: Bearer %s", key) < 0)
+		return headers; /* the daemon asks for it */
+	headers = curl_slist_append(headers, line);
+	free(line);
+	return headers;
+}
+
 static struct curl_slist *request_headers(const struct client *client, const struct http_request *request)
 {
 	char line[64];
@@ -64,6 +74,8 @@ static struct curl_slist *request_headers(const struct client *client, const str
 	}
 	if (request->header)
 		headers = curl_slist_append(headers, request->header);
+	if (client->key)
+		headers = append_key(headers, client->key);
 	if (client->timeout_s > 0) {
 		snprintf(line, sizeof line, "X-Timeout-Ms: %.0f", client->timeout_s * 1000);
 		headers = curl_slist_append(headers, line);
@@ -81,6 +93,8 @@ static void set_options(CURL *curl, const struct client *client, const struct ht
 	curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, append_body);
 	if (client->timeout_s > 0)
 		curl_easy_setopt(curl, CURLOPT_TIMEOUT_MS, (long)(client->timeout_s * 1000) + GRACE_MS);
+	if (client->ca_cert)
+		curl_easy_setopt(curl, CURLOPT_CAINFO, client->ca_cert);
 	if (request->json) {
 		curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)strlen(request->json));
 		curl_easy_setopt(curl, CURLOPT_POSTFIELDS, request->json);

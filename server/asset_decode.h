@@ -1,6 +1,6 @@
-/* Uploaded pictures into numbers: the one place where bytes of strangers are decoded. It gets an open file and gives back plain numbers,
- * so that it can move into a process of its own. Rows are taken one strip at a time, so that memory follows from what is kept and not from
- * what is sent (renderer/image/picture_file.h bounds the strip). Any thread.
+/* Uploaded pictures into numbers: the one place where bytes of strangers are decoded, and that in a process of its own: the daemon calls
+ * decoder.h, which has the same functions. It gets an open file and gives back plain numbers. Rows are taken one strip at a time, so that
+ * memory follows from what is kept and not from what is sent (renderer/image/picture_file.h bounds the strip). Any thread.
  *
  * Alpha multiplies a PNG; an EXR is so already, and its alpha is left out. As thickness a picture with colours counts by its luminance.
  */

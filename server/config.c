@@ -1,6 +1,7 @@
 #include "server/config.h"
 
 #include "renderer/log.h"
+#include "server/key_file.h"
 
 #include <errno.h>
 #include <stddef.h>
@@ -65,6 +66,18 @@ static const struct option options[] = {
 	 OPTION_INTEGER, AT(assets_mb), .low = 1, .high = 1048576},
 	{"--reference-mpaths", "STRATUS_REFERENCE_MPATHS", "M", "light paths of one picture of the model reference, in millions; more are answered 422",
 	 OPTION_INTEGER, AT(reference_mpaths), .low = 1, .high = 1048576},
+	{"--keys", "STRATUS_KEYS", "FILE", "file of the keys that requests must show; without it none are asked for",
+	 OPTION_TEXT, AT(keys)},
+	{"--open-metrics", "STRATUS_OPEN_METRICS", NULL, "/metrics needs no key",
+	 OPTION_FLAG, AT(open_metrics)},
+	{"--allow-anyone", "STRATUS_ALLOW_ANYONE", NULL, "serve without keys on an address that others than this machine reach",
+	 OPTION_FLAG, AT(allow_anyone)},
+	{"--tls-cert", "STRATUS_TLS_CERT", "FILE", "serve HTTPS with this certificate and chain, PEM",
+	 OPTION_TEXT, AT(tls_cert)},
+	{"--tls-key", "STRATUS_TLS_KEY", "FILE", "the private key of that certificate, PEM",
+	 OPTION_TEXT, AT(tls_key)},
+	{"--cors-origins", "STRATUS_CORS_ORIGINS", "LIST", "origins whose pages may read answers, such as https://example.org, with commas between them",
+	 OPTION_TEXT, AT(cors_origins)},
 	{"--log-level", "STRATUS_LOG_LEVEL", "LEVEL", "error, warning, info, debug",
 	 OPTION_CHOICE, AT(log_level), .choices = level_names},
 	{"--log-format", "STRATUS_LOG_FORMAT", "FORMAT", "text, json (an object a line)",
@@ -191,6 +204,7 @@ static void print_help(const struct config *defaults)
 	}
 	printf("  --print-config           print the settings as environment variables and exit\n"
 	       "  --check-config           print them, look whether the daemon could start so, and exit: 0 yes, 2 no\n"
+	       "  --new-key NAME           print a new key and its line for the file of keys, and exit\n"
 	       "  --version                print the version and exit\n"
 	       "  --help                   print this and exit\n");
 }
@@ -269,6 +283,8 @@ enum config_result config_parse(int argc, char **argv, struct config *config)
 			printf("stratus %s\n", RENDERER_VERSION);
 			return CONFIG_DONE;
 		}
+		if (strcmp(argv[i], "--new-key") == 0)
+			return i + 1 < argc && key_file_print_new(argv[i + 1]) ? CONFIG_DONE : CONFIG_BAD;
 		if (strcmp(argv[i], "--print-config") == 0) {
 			print = true;
 			i++;

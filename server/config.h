@@ -24,15 +24,21 @@ struct config {
 	int assets_disk_mb;   /* 0..16777216; likewise */
 	int assets_mb;        /* 1..1048576; decoded, in memory */
 	int reference_mpaths; /* 1..1048576; millions of light paths of one picture by the reference */
-	int log_level;        /* enum log_level */
-	int log_format;       /* enum log_format */
+	const char *keys;     /* file of keys (key_file.h); NULL: none are asked for */
+	bool open_metrics;    /* /metrics needs none */
+	bool allow_anyone;    /* without keys on an address that others reach */
+	const char *tls_cert; /* PEM; both or neither */
+	const char *tls_key;
+	const char *cors_origins; /* as cors.h has them; NULL: none */
+	int log_level;            /* enum log_level */
+	int log_format;           /* enum log_format */
 
 	char state_dir_buffer[4096]; /* holds the default of state_dir */
 };
 
 enum config_result { CONFIG_RUN, CONFIG_DONE, CONFIG_CHECK, CONFIG_BAD };
 
-/* Reads environment and flags. CONFIG_DONE: --help, --version or --print-config was answered on standard output. CONFIG_CHECK:
+/* Reads environment and flags. CONFIG_DONE: --help, --version, --print-config or --new-key was answered on standard output. CONFIG_CHECK:
  * --check-config is asked for. CONFIG_BAD: standard error says what is wrong. Strings point into argv and the environment. Main thread,
  * before others exist. */
 enum config_result config_parse(int argc, char **argv, struct config *config);

@@ -3,8 +3,12 @@
 #include "renderer/embed.h"
 #include "renderer/image/image.h"
 #include "renderer/log.h"
+#include "server/access.h"
+#include "server/api_keys.h"
+#include "server/cors.h"
 #include "server/http.h"
 #include "server/kernel_file.h"
+#include "server/tls.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -100,6 +104,23 @@ static bool check_images(const char *image_module)
 	return images != NULL;
 }
 
+static bool check_keys(const char *path)
+{
+	struct api_keys *keys = path ? api_keys_create(path) : NULL;
+	api_keys_destroy(keys);
+	return !path || keys;
+}
+
+bool config_is_consistent(const struct config *config)
+{
+	bool good = cors_origins_are_valid(config->cors_origins);
+	if (!config->tls_cert != !config->tls_key) {
+		log_error("--tls-cert and --tls-key go together");
+		good = false;
+	}
+	return access_settings_are_safe(config) && good;
+}
+
 static void warn_of_unknown_variables(void)
 {
 	static const char prefix[] = "STRATUS_";
@@ -120,5 +141,8 @@ bool config_check(const struct config *config)
 	good &= check_kernel(config);
 	good &= check_shaders(config->shader_dir);
 	good &= check_images(config->image_module);
+	good &= config_is_consistent(config);
+	good &= check_keys(config->keys);
+	good &= !config->tls_cert || !config->tls_key || tls_check(config->tls_cert, config->tls_key);
 	return good;
 }

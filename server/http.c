@@ -1,11 +1,14 @@
 #include "server/http.h"
 
 #include "renderer/log.h"
+#include "server/access.h"
 #include "server/clock.h"
+#include "server/cors.h"
 #include "server/negotiation.h"
 #include "server/request_log.h"
 #include "server/response.h"
 #include "server/routes.h"
+#include "server/tls.h"
 
 #include <errno.h>
 #include <netdb.h>
@@ -60,6 +63,9 @@ static enum MHD_Result begin(struct request *request, const char *method)
 	snprintf(request->method, sizeof request->method, "%s", method);
 	request->route = routes_find(request->path);
 	request->next = request->route->handler;
+	enum MHD_Result answered;
+	if (cors_answer_preflight(request, &answered) || !access_admit(request, &answered))
+		return answered;
 	if (!request->route->allow)
 		return request->next(request);
 	if (!allows(request->route, method))
@@ -123,6 +129,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 		request->bytes = 0; /* those that a GET would send */
 	/* Without a method: the headers never came, or libmicrohttpd refused them by itself. */
 	metrics_count_request(service->metrics, route, status, took, request->bytes);
+	access_end(request, status);
 	request_log(request, status, took);
 	if (request->is_accepted)
 		service->in_flight--;
@@ -166,18 +173,21 @@ static bool split_address(const char *listen, char *host, size_t size, const cha
 	return true;
 }
 
-static struct addrinfo *resolve(const char *listen, char *host, size_t size)
+/* silent: what is wrong is said elsewhere. */
+static struct addrinfo *resolve(const char *listen, char *host, size_t size, bool silent)
 {
 	const struct addrinfo hints = {.ai_flags = AI_PASSIVE | AI_NUMERICSERV, .ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM};
 	struct addrinfo *addresses = NULL;
 	const char *port;
 	if (!split_address(listen, host, size, &port)) {
-		log_error("--listen %s: must be HOST:PORT or [IPv6]:PORT, PORT from 0 to 65535", listen);
+		if (!silent)
+			log_error("--listen %s: must be HOST:PORT or [IPv6]:PORT, PORT from 0 to 65535", listen);
 		return NULL;
 	}
 	int error = getaddrinfo(host, port, &hints, &addresses);
 	if (error) {
-		log_error("--listen %s: %s", listen, gai_strerror(error));
+		if (!silent)
+			log_error("--listen %s: %s", listen, gai_strerror(error));
 		return NULL;
 	}
 	return addresses;
@@ -186,7 +196,7 @@ static struct addrinfo *resolve(const char *listen, char *host, size_t size)
 bool http_can_listen(const char *listen)
 {
 	char host[256];
-	struct addrinfo *address = resolve(listen, host, sizeof host);
+	struct addrinfo *address = resolve(listen, host, sizeof host, false);
 	if (!address)
 		return false;
 	const int fd = socket(address->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0), reuse = 1;
@@ -204,22 +214,47 @@ bool http_can_listen(const char *listen)
 	return bound || error == EADDRINUSE;
 }
 
+static bool is_loopback(const struct sockaddr *address)
+{
+	if (address->sa_family == AF_INET)
+		return ntohl(((const struct sockaddr_in *)address)->sin_addr.s_addr) >> 24 == IN_LOOPBACKNET;
+	if (address->sa_family != AF_INET6)
+		return false;
+	const struct in6_addr *host = &((const struct sockaddr_in6 *)address)->sin6_addr;
+	return IN6_IS_ADDR_LOOPBACK(host) || (IN6_IS_ADDR_V4MAPPED(host) && host->s6_addr[12] == IN_LOOPBACKNET);
+}
+
+bool http_is_local(const char *listen)
+{
+	char host[256];
+	struct addrinfo *address = resolve(listen, host, sizeof host, true);
+	const bool local = !address || is_loopback(address->ai_addr);
+	if (address)
+		freeaddrinfo(address);
+	return local;
+}
+
 static struct MHD_Daemon *start_daemon(struct service *service, const struct addrinfo *address)
 {
 	unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG;
 	if (address->ai_family == AF_INET6)
 		flags |= MHD_USE_IPv6;
-	return MHD_start_daemon(
-		flags, 0, NULL, NULL, on_access, service, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, NULL, MHD_OPTION_SOCK_ADDR,
-		address->ai_addr, MHD_OPTION_URI_LOG_CALLBACK, on_target, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed, service,
-		MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT, (unsigned)CONNECTIONS_MAX,
-		MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_SECONDS, MHD_OPTION_THREAD_POOL_SIZE, (unsigned)HTTP_THREADS, MHD_OPTION_END);
+	if (service->config->tls_cert)
+		flags |= MHD_USE_TLS;
+	/* Options end where the certificate's would begin when there is none. */
+	const enum MHD_OPTION certificate = service->config->tls_cert ? MHD_OPTION_HTTPS_CERT_CALLBACK2 : MHD_OPTION_END;
+	return MHD_start_daemon(flags, 0, NULL, NULL, on_access, service, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, NULL,
+				MHD_OPTION_SOCK_ADDR, address->ai_addr, MHD_OPTION_URI_LOG_CALLBACK, on_target, service,
+				MHD_OPTION_NOTIFY_COMPLETED, on_completed, service, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+				(size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT, (unsigned)CONNECTIONS_MAX,
+				MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_SECONDS, MHD_OPTION_THREAD_POOL_SIZE, (unsigned)HTTP_THREADS,
+				certificate, tls_retrieve, MHD_OPTION_HTTPS_PRIORITIES, TLS_PRIORITIES, MHD_OPTION_END);
 }
 
 bool http_start(struct service *service)
 {
 	char host[sizeof service->host - 2];
-	struct addrinfo *address = resolve(service->config->listen, host, sizeof host);
+	struct addrinfo *address = resolve(service->config->listen, host, sizeof host, false);
 	if (!address)
 		return false;
 	service->daemon = start_daemon(service, address);

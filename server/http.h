@@ -7,6 +7,9 @@
 /* Can this process listen on an address of --listen? Yes, too, when another one does. false and a log line when not. */
 bool http_can_listen(const char *listen);
 
+/* Does nobody but this machine reach an address of --listen? Yes, too, when it is none. */
+bool http_is_local(const char *listen);
+
 /* Listens on config->listen and starts the HTTP threads; sets service->daemon, host and port. false and a log line on failure. */
 bool http_start(struct service *service);
 

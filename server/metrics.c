@@ -21,7 +21,7 @@ static const char *const source_names[DROPLET_SOURCE_COUNT] = {
 	[DROPLETS_FROM_MEMORY] = "memory", [DROPLETS_FROM_DISK] = "disk", [DROPLETS_COMPUTED] = "computed"};
 
 /* Every status that is sent; the last stands for all others. */
-static const unsigned statuses[] = {200, 201, 204, 304, 400, 404, 405, 406, 412, 413, 415, 422, 499, 500, 503, 504, 507, 0};
+static const unsigned statuses[] = {200, 201, 204, 304, 400, 401, 404, 405, 406, 412, 413, 415, 422, 429, 499, 500, 503, 504, 507, 0};
 enum { STATUS_COUNT = sizeof statuses / sizeof *statuses };
 
 enum { BOUND_COUNT = 16 };
@@ -293,6 +293,43 @@ static void write_assets(struct text *text, const struct metrics_now *now)
 	text_printf(text, "stratus_asset_maps_bytes %llu\n", (unsigned long long)now->asset_map_bytes);
 }
 
+/* Where one family ends another begins, so each asks for all keys. */
+struct key_writer {
+	struct text *text;
+	enum { KEY_REQUESTS, KEY_REFUSED, KEY_PIXELS } family;
+};
+
+static void write_key(void *context, const char *name, const struct api_key_counts *counts)
+{
+	static const char *const limits[KEY_LIMIT_COUNT] = {[KEY_LIMIT_REQUESTS] = "requests", [KEY_LIMIT_MEGAPIXELS] = "megapixels"};
+	const struct key_writer *writer = context;
+	switch (writer->family) {
+	case KEY_REQUESTS:
+		text_printf(writer->text, "stratus_key_requests_total{key=\"%s\"} %lu\n", name, counts->requests);
+		break;
+	case KEY_REFUSED:
+		for (int i = 0; i < KEY_LIMIT_COUNT; i++)
+			text_printf(writer->text, "stratus_key_refused_total{key=\"%s\",limit=\"%s\"} %lu\n", name, limits[i],
+				    counts->refused[i]);
+		break;
+	case KEY_PIXELS:
+		text_printf(writer->text, "stratus_key_pixels_total{key=\"%s\"} %.0f\n", name, counts->pixels);
+		break;
+	}
+}
+
+static void write_keys(struct text *text, const struct metrics_now *now)
+{
+	write_family(text, "key_requests", "counter", "Answers by the name of the key that the request showed; anonymous: none.");
+	api_keys_visit(now->keys, write_key, &(struct key_writer){text, KEY_REQUESTS});
+	write_family(text, "key_refused", "counter", "Requests refused since the key had used up what it may have a minute.");
+	api_keys_visit(now->keys, write_key, &(struct key_writer){text, KEY_REFUSED});
+	write_family(text, "key_pixels", "counter", "Pixels of pictures that were answered, layers counted apart, by key.");
+	api_keys_visit(now->keys, write_key, &(struct key_writer){text, KEY_PIXELS});
+	write_family(text, "certificate_expiry_seconds", "gauge", "Unix time at which the certificate ends; 0: there is none.");
+	text_printf(text, "stratus_certificate_expiry_seconds %lld\n", (long long)now->certificate_expiry);
+}
+
 /* The read-back remembers nothing. */
 static void write_cache(struct text *text, const struct metrics_now *now)
 {
@@ -387,6 +424,7 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_tracings(&text, copy, now);
 	write_droplets(&text, &now->droplets);
 	write_assets(&text, now);
+	write_keys(&text, now);
 	write_cache(&text, now);
 	write_infos(&text, now->info);
 	write_process(&text, copy);

@@ -1,13 +1,17 @@
 /* Counters and histograms for /metrics, as OpenMetrics text. Any thread.
  *
- * Labels are bounded by construction: routes, statuses, stages and reasons are enumerations, never text of a request.
+ * Labels are bounded by construction: routes, statuses, stages and reasons are enumerations, keys those of the file of keys; never text of
+ * a request.
  */
 #ifndef STRATUS_SERVER_METRICS_H
 #define STRATUS_SERVER_METRICS_H
 
 #include "renderer/droplet_store.h"
+#include "server/api_keys.h"
 #include "server/problem.h"
 #include "server/server_timing.h"
+
+#include <time.h>
 
 enum metrics_route {
 	ROUTE_RENDER,
@@ -59,6 +63,8 @@ struct metrics_now {
 	double queue_pixels;
 	size_t tracings_waiting, tracings_limit;
 	struct droplet_store_counts droplets;
+	struct api_keys *keys;
+	time_t certificate_expiry; /* 0: there is none */
 	size_t assets;
 	uint64_t asset_bytes, asset_map_bytes;        /* on disk; decoded, in memory */
 	size_t cache_bytes[STAGE_COUNT], cache_limit; /* on the GPU */

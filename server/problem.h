@@ -12,6 +12,8 @@ enum problem_kind {
 	PROBLEM_NONE,
 	PROBLEM_NOT_JSON,       /* 400, with line and column */
 	PROBLEM_BAD_REQUEST,    /* 400, a malformed query or header */
+	PROBLEM_NO_KEY,         /* 401 */
+	PROBLEM_BAD_KEY,        /* 401 */
 	PROBLEM_NOT_FOUND,      /* 404 */
 	PROBLEM_METHOD,         /* 405 */
 	PROBLEM_NOT_ACCEPTABLE, /* 406 */
@@ -20,6 +22,7 @@ enum problem_kind {
 	PROBLEM_MEDIA_TYPE,     /* 415 */
 	PROBLEM_INVALID,        /* 422, with `errors` */
 	PROBLEM_BAD_ASSET,      /* 422 */
+	PROBLEM_ALLOWANCE,      /* 429 */
 	PROBLEM_INTERNAL,       /* 500 */
 	PROBLEM_RENDER_FAILED,  /* 500 */
 	PROBLEM_QUEUE_FULL,     /* 503 */

@@ -13,10 +13,10 @@
 /* The path of an absolute target ("http://host/path", sent to proxies), or the target itself. */
 static const char *origin_form(const char *target)
 {
-	static const char scheme[] = "http://";
-	if (strncmp(target, scheme, sizeof scheme - 1) != 0)
+	const char *host = strncmp(target, "http://", 7) == 0 ? target + 7 : strncmp(target, "https://", 8) == 0 ? target + 8 : NULL;
+	if (!host)
 		return target;
-	const char *path = strchr(target + sizeof scheme - 1, '/');
+	const char *path = strchr(host, '/');
 	return path ? path : "/";
 }
 

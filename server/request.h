@@ -8,6 +8,7 @@
 #define STRATUS_SERVER_REQUEST_H
 
 #include "server/digest.h"
+#include "server/key_file.h"
 #include "server/metrics.h"
 #include "server/problem.h"
 #include "server/text.h"
@@ -45,6 +46,9 @@ struct request {
 	struct text body;
 	struct problem problem;
 	struct timings timings;
+	char key[KEY_NAME_SIZE]; /* name of the key that it shows; empty: none */
+	double admitted_pixels;  /* of the picture that its key may have */
+	unsigned retry_after_s;  /* when the key may have more */
 	unsigned status;         /* answered; 0: not yet */
 	uint64_t bytes;          /* of the answer's body */
 	char scene[DIGEST_SIZE]; /* hash of the canonical scene that is asked for, for the log; empty: none */

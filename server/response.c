@@ -2,9 +2,11 @@
 
 #include "renderer/log.h"
 #include "server/clock.h"
+#include "server/cors.h"
 #include "server/entity_tag.h"
 #include "server/service.h"
 
+#include <gnutls/gnutls.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -52,7 +54,7 @@ enum MHD_Result response_send(struct request *request, unsigned status, struct M
 	char timing[SERVER_TIMING_SIZE];
 	format_timing(request, timing);
 	response_set(response, "Server-Timing", timing);
-	response_set(response, "Timing-Allow-Origin", "*");
+	cors_allow(request, response);
 	response_set(response, "X-Request-Id", request->id);
 	enum MHD_Result result = MHD_queue_response(request->connection, status, response);
 	MHD_destroy_response(response);
@@ -71,6 +73,8 @@ static unsigned retry_after(const struct request *request)
 		return service_tracing_retry_seconds(request->service);
 	case PROBLEM_COMPUTERS_FULL:
 		return service_computing_retry_seconds(request->service);
+	case PROBLEM_ALLOWANCE:
+		return request->retry_after_s;
 	case PROBLEM_UPLOADS_FULL:
 	case PROBLEM_STARTING:
 		return 2;
@@ -96,6 +100,10 @@ enum MHD_Result response_send_problem(struct request *request)
 	}
 	if (request->problem.kind == PROBLEM_NOT_ACCEPTABLE)
 		response_set(response, "Vary", "Accept");
+	if (request->problem.kind == PROBLEM_NO_KEY) /* RFC 6750, 3 */
+		response_set(response, "WWW-Authenticate", "Bearer realm=\"stratus\"");
+	if (request->problem.kind == PROBLEM_BAD_KEY)
+		response_set(response, "WWW-Authenticate", "Bearer realm=\"stratus\", error=\"invalid_token\"");
 	if (request->problem.kind == PROBLEM_METHOD)
 		response_set(response, "Allow", request->route->allow);
 	return response_send(request, problem_status(request->problem.kind), response);
@@ -141,23 +149,34 @@ enum MHD_Result response_send_json(struct request *request, unsigned status, jso
 	return response_send(request, status, response);
 }
 
+/* Past libmicrohttpd, to the client's end of the connection. The text is far smaller than a socket's buffer; a client that reads nothing
+ * gets nothing. */
+static bool send_past(struct request *request, const char *data, size_t size)
+{
+	const union MHD_ConnectionInfo *tls = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);
+	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+	if (request->service->config->tls_cert)
+		return tls && gnutls_record_send((gnutls_session_t)tls->tls_session, data, size) > 0;
+	return info && send(info->connect_fd, data, size, MSG_NOSIGNAL | MSG_DONTWAIT) > 0;
+}
+
 enum MHD_Result response_refuse_body(struct request *request, uint64_t limit)
 {
-	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
 	struct text answer = {0};
+	const char *origin = cors_origin(request);
 	char timing[SERVER_TIMING_SIZE];
 	format_timing(request, timing);
 	problem_set(&request->problem, PROBLEM_TOO_LARGE, "A body has at most %llu bytes.", (unsigned long long)limit);
 	metrics_count_problem(request->service->metrics, request->problem.kind);
 	char *body = problem_to_json(&request->problem, request->id, 0);
-	if (body && info) {
+	if (body) {
 		text_printf(&answer,
 			    "HTTP/1.1 413 Content Too Large\r\nContent-Type: application/problem+json\r\nContent-Length: %zu\r\n"
-			    "Cache-Control: " CACHE_NONE "\r\nServer-Timing: %s\r\nTiming-Allow-Origin: *\r\nX-Request-Id: %s\r\n"
+			    "Cache-Control: " CACHE_NONE "\r\nServer-Timing: %s\r\n%s%s%sX-Request-Id: %s\r\n"
 			    "Connection: close\r\n\r\n%s",
-			    strlen(body), timing, request->id, body);
-		/* The answer is far smaller than a socket's buffer; a client that reads nothing gets nothing. */
-		if (!answer.failed && send(info->connect_fd, answer.data, answer.length, MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
+			    strlen(body), timing, origin ? "Access-Control-Allow-Origin: " : "", origin ? origin : "", origin ? "\r\n" : "",
+			    request->id, body);
+		if (!answer.failed && send_past(request, answer.data, answer.length))
 			request->status = problem_status(PROBLEM_TOO_LARGE), request->bytes = strlen(body);
 	}
 	free(body);

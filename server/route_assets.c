@@ -1,7 +1,7 @@
 /* /v1/assets: uploaded pictures.
  *
- * The body of a PUT goes to a file as it comes. When it is whole the request waits, suspended, for the thread that decodes: that looks
- * through the picture and puts it under its name.
+ * The body of a PUT goes to a file as it comes. When it is whole the request waits, suspended, for the thread that has it decoded: that
+ * looks through the picture and puts it under its name.
  */
 #include "server/routes.h"
 
@@ -36,7 +36,7 @@ struct asset_work {
 	double deadline_ms;
 
 	enum asset_result result;
-	bool examined, late; /* it can be used; nobody waited for it any more */
+	enum decoder_result examined; /* DECODER_OK: it can be used */
 	struct asset_facts facts;
 	char error[PROBLEM_DETAIL_SIZE - 32];
 	bool created;
@@ -235,10 +235,12 @@ static enum MHD_Result send_put(struct request *request)
 {
 	const struct asset_work *work = request->work;
 	char tag[ENTITY_TAG_SIZE];
-	if (work->late)
+	if (work->examined == DECODER_LATE)
 		return response_send_new_problem(request, PROBLEM_DEADLINE, "The asset was not looked through within its deadline.");
-	if (!work->examined)
+	if (work->examined == DECODER_REFUSED)
 		return response_send_new_problem(request, PROBLEM_BAD_ASSET, "The picture %s.", work->error);
+	if (work->examined == DECODER_FAILED)
+		return send_result(request, ASSET_FAILED);
 	if (work->result != ASSET_OK)
 		return send_result(request, work->result);
 	log_info("asset %s is %s by request %s", work->name, work->hash, request->id);
@@ -262,9 +264,10 @@ static void examine(struct work *base)
 	struct service *service = request->service;
 	uint64_t size;
 	const int fd = asset_upload_fd(work->upload, &size);
-	work->late = clock_now_ms() >= work->deadline_ms || service->giving_up;
-	work->examined = !work->late && asset_examine(service->images, fd, size, &work->facts, work->error, sizeof work->error);
-	if (work->examined)
+	work->examined = service->giving_up ? DECODER_LATE
+					    : decoder_examine(service->decoder, fd, size, work->deadline_ms, &work->facts, work->error,
+							      sizeof work->error);
+	if (work->examined == DECODER_OK)
 		work->result = asset_upload_commit(work->upload, &work->facts, &work->condition, &work->created, work->hash);
 	end_upload(work);
 	request_resume(request);
@@ -290,7 +293,7 @@ static enum MHD_Result finish_put(struct request *request)
 	request_suspend(request, send_put);
 	if (!worker_pool_try(service->decoders, &work->examine)) {
 		work->result = ASSET_BUSY;
-		work->examined = true;
+		work->examined = DECODER_OK;
 		request_resume(request);
 	}
 	return MHD_YES;

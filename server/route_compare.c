@@ -7,6 +7,7 @@
 
 #include "renderer/image/regions.h"
 #include "renderer/log.h"
+#include "server/access.h"
 #include "server/call.h"
 #include "server/clock.h"
 #include "server/compare_query.h"
@@ -286,8 +287,8 @@ static void decode(struct work *base)
 	struct service *service = work->request->service;
 	run->job.waited_ms += clock_now_ms() - run->decoding_since_ms;
 	run->job.outcome = RENDER_OUTCOME_FAILED;
-	if (render_job_is_over(&run->job) ||
-	    !scene_assets_decode(service->maps, service->images, run->scene, &run->assets, job_is_over, &run->job, run->decode_ms)) {
+	if (render_job_is_over(&run->job) || !scene_assets_decode(service->maps, service->decoder, run->scene, &run->assets, job_is_over,
+								  &run->job, run->job.deadline_ms, run->decode_ms)) {
 		work->ended = &run->job;
 		hand_back(work);
 	} else if (!push(work, run)) {
@@ -340,6 +341,10 @@ enum MHD_Result route_compare(struct request *request)
 		plan(work);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
 		return response_send_problem(request);
+	const struct scene_output *output = &work->query.variant[0].input.scene.output;
+	enum MHD_Result result;
+	if (!access_admit_pixels(request, (double)output->width * output->height * work->query.variant_count, &result))
+		return result;
 	/* Suspended first: a picture may be done before start_run returns. */
 	request_suspend(request, finish);
 	if (!start_run(work))

@@ -7,6 +7,7 @@
 #include "server/routes.h"
 
 #include "renderer/log.h"
+#include "server/access.h"
 #include "server/call.h"
 #include "server/clock.h"
 #include "server/json_document.h"
@@ -248,17 +249,26 @@ static void decode(struct work *base)
 	struct service *service = work->request->service;
 	work->job.waited_ms += clock_now_ms() - work->decoding_since_ms;
 	work->job.outcome = RENDER_OUTCOME_FAILED;
-	if (render_job_is_over(&work->job) ||
-	    !scene_assets_decode(service->maps, service->images, &work->input.scene, &work->assets, is_over, &work->job, work->decode_ms))
+	if (render_job_is_over(&work->job) || !scene_assets_decode(service->maps, service->decoder, &work->input.scene, &work->assets,
+								   is_over, &work->job, work->job.deadline_ms, work->decode_ms))
 		call_end_render(work->request, &work->job);
 	else if (!preparation_push(service->preparation, &work->job))
 		refuse(work);
+}
+
+/* Layers counted apart. */
+static double pixels_of(const struct scene_output *output)
+{
+	return (double)output->width * output->height * __builtin_popcount(output->layers);
 }
 
 static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 {
 	struct render_work *work = request->work;
 	struct service *service = request->service;
+	enum MHD_Result refused;
+	if (!access_admit_pixels(request, pixels_of(&work->input.scene.output), &refused))
+		return refused;
 	work->job.scene = &work->input.scene;
 	work->deadline_ms = deadline_ms;
 	work->job.deadline_ms = reference_stop_ms(&work->input.scene, clock_now_ms(), deadline_ms, 0);

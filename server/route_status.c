@@ -3,6 +3,7 @@
 
 #include "server/response.h"
 #include "server/service.h"
+#include "server/tls.h"
 
 static const char *const state_names[] = {
 	[SERVICE_STARTING] = "starting", [SERVICE_READY] = "ready", [SERVICE_STOPPING] = "stopping", [SERVICE_FAILED] = "failed"};
@@ -43,6 +44,8 @@ enum MHD_Result route_metrics(struct request *request)
 		.queue_pixels = service_queue_pixels(service),
 		.queue_limit = (size_t)service->config->queue_length,
 		.requests_in_flight = service->in_flight,
+		.keys = service->keys,
+		.certificate_expiry = tls_expiry(),
 		.tracings_waiting = worker_pool_waiting(service->tracers),
 		.tracings_limit = SERVICE_TRACINGS_MAX,
 		.cache_limit = (size_t)service->config->cache_mb << 20,

@@ -103,23 +103,27 @@ bool scene_assets_take(struct asset_maps *maps, struct scene *scene, struct scen
 	return complete;
 }
 
-static bool decode(struct asset_maps *maps, const struct image_api *images, struct scene *scene, int i, struct asset_file *file)
+static bool decode(struct asset_maps *maps, struct decoder *decoder, struct scene *scene, int i, struct asset_file *file,
+		   double deadline_ms)
 {
 	unsigned char hash[SCENE_MAP_HASH_BYTES];
-	char error[256];
+	char error[256] = "see above";
+	struct scene_map *map;
 	struct scene_map_choice *choice = choice_of(scene, i);
 	asset_hash_bytes(file, hash);
-	choice->map = asset_decode(images, file->fd, file->bytes, members[i].use, side_of(scene, i), hash, error, sizeof error);
-	if (choice->map)
-		asset_maps_keep(maps, file, members[i].use, side_of(scene, i), choice->map);
-	else
+	const enum decoder_result result = decoder_read_map(decoder, file->fd, file->bytes, deadline_ms, &file->facts, members[i].use,
+							    side_of(scene, i), hash, &map, error, sizeof error);
+	choice->map = map;
+	if (map)
+		asset_maps_keep(maps, file, members[i].use, side_of(scene, i), map);
+	else if (result != DECODER_LATE)
 		log_error("asset %s, which could be read before: %s", choice->name, error);
 	asset_file_close(file);
-	return choice->map;
+	return map;
 }
 
-bool scene_assets_decode(struct asset_maps *maps, const struct image_api *images, struct scene *scene, struct scene_assets *assets,
-			 bool (*is_over)(void *context), void *context, double milliseconds[SCENE_ASSETS_COUNT])
+bool scene_assets_decode(struct asset_maps *maps, struct decoder *decoder, struct scene *scene, struct scene_assets *assets,
+			 bool (*is_over)(void *context), void *context, double deadline_ms, double milliseconds[SCENE_ASSETS_COUNT])
 {
 	for (int i = 0; i < SCENE_ASSETS_COUNT; i++) {
 		const struct scene_map *mine = scene->clouds.map.map;
@@ -133,8 +137,10 @@ bool scene_assets_decode(struct asset_maps *maps, const struct image_api *images
 		if (is_over(context))
 			return false;
 		const double begin = clock_now_ms();
-		if (!decode(maps, images, scene, i, &assets->file[i]))
+		if (!decode(maps, decoder, scene, i, &assets->file[i], deadline_ms)) {
+			is_over(context);
 			return false;
+		}
 		milliseconds[i] = clock_now_ms() - begin;
 	}
 	return true;

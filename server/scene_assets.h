@@ -3,6 +3,7 @@
 #define STRATUS_SERVER_SCENE_ASSETS_H
 
 #include "server/asset_maps.h"
+#include "server/decoder.h"
 #include "server/problem.h"
 
 enum { SCENE_ASSETS_COUNT = 2 };
@@ -24,10 +25,11 @@ void scene_assets_use_mean_ground(struct scene *scene, const struct scene_assets
 /* Takes from memory what is there. true when nothing is missing. */
 bool scene_assets_take(struct asset_maps *maps, struct scene *scene, struct scene_assets *assets);
 
-/* Decodes what is missing, waiting for memory that other scenes hold for as long as `is_over` says false. milliseconds: what decoding took.
- * false when it is over, or (with a log line) a file cannot be read any more. */
-bool scene_assets_decode(struct asset_maps *maps, const struct image_api *images, struct scene *scene, struct scene_assets *assets,
-			 bool (*is_over)(void *context), void *context, double milliseconds[SCENE_ASSETS_COUNT]);
+/* Decodes what is missing, waiting for memory that other scenes hold for as long as `is_over` says false. deadline_ms: when that will say
+ * true at the latest. milliseconds: what decoding took. false when it is over (is_over was asked last then), or (with a log line) a file
+ * cannot be read any more. */
+bool scene_assets_decode(struct asset_maps *maps, struct decoder *decoder, struct scene *scene, struct scene_assets *assets,
+			 bool (*is_over)(void *context), void *context, double deadline_ms, double milliseconds[SCENE_ASSETS_COUNT]);
 
 /* The scene is rendered: lets its maps go. Once or more. */
 void scene_assets_release(struct scene *scene);

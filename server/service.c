@@ -8,6 +8,7 @@
 #include "server/http.h"
 #include "server/response.h"
 #include "server/text.h"
+#include "server/tls.h"
 
 #include <pthread.h>
 #include <stdlib.h>
@@ -74,7 +75,8 @@ static bool open_assets(struct service *service)
 					    .count = (size_t)config->asset_count};
 	service->assets = asset_store_create(config->state_dir, &limits);
 	service->maps = asset_maps_create((size_t)config->assets_mb << 20);
-	return service->assets && service->maps;
+	service->decoder = decoder_create(config->image_module, &decoder_default_limits);
+	return service->assets && service->maps && service->decoder;
 }
 
 struct service *service_create(const struct config *config)
@@ -94,7 +96,10 @@ struct service *service_create(const struct config *config)
 	service->tracers = worker_pool_create(1, SERVICE_TRACINGS_MAX, TRACER_NICE);
 	service->decoders = worker_pool_create(1, (size_t)config->queue_length, DECODER_NICE);
 	const bool pools = service->workers && service->computers && service->tracers && service->decoders;
-	if (pools && open_assets(service) && service->metrics && service->queue && http_start(service) && start_rendering(service))
+	service->keys = api_keys_create(config->keys);
+	const bool guarded = service->keys && (!config->tls_cert || tls_load(config->tls_cert, config->tls_key));
+	if (pools && guarded && open_assets(service) && service->metrics && service->queue && http_start(service) &&
+	    start_rendering(service))
 		return service;
 	service_destroy(service);
 	return NULL;
@@ -161,12 +166,26 @@ void service_destroy(struct service *service)
 	worker_pool_destroy(service->computers);
 	worker_pool_destroy(service->tracers);
 	worker_pool_destroy(service->decoders);
+	decoder_destroy(service->decoder);
 	asset_maps_destroy(service->maps);
 	asset_store_destroy(service->assets);
 	render_queue_destroy(service->queue);
 	metrics_destroy(service->metrics);
+	api_keys_destroy(service->keys);
+	tls_unload();
 	free(service->pixel_version);
 	free(service);
+}
+
+bool service_reload(struct service *service)
+{
+	const struct config *config = service->config;
+	const bool keys = api_keys_reload(service->keys);
+	const bool certificate = !config->tls_cert || tls_load(config->tls_cert, config->tls_key);
+	if (!keys || !certificate)
+		log_error("reload: %s%s%s of before stay in force", keys ? "" : "the keys", keys || certificate ? "" : " and ",
+			  certificate ? "" : "the certificate");
+	return keys && certificate;
 }
 
 enum service_state service_state(const struct service *service)

@@ -3,8 +3,10 @@
 #define STRATUS_SERVER_SERVICE_H
 
 #include "renderer/image/image.h"
+#include "server/api_keys.h"
 #include "server/asset_maps.h"
 #include "server/config.h"
+#include "server/decoder.h"
 #include "server/metrics.h"
 #include "server/preparation.h"
 #include "server/render_queue.h"
@@ -35,9 +37,11 @@ struct service {
 	struct worker_pool *workers;     /* encode images: the render thread waits for them, so nothing slow runs here */
 	struct worker_pool *computers;   /* droplets and layers for their own calls, behind the pictures */
 	struct worker_pool *tracers;     /* one thread that traces photons, on all processors, behind everything else */
-	struct worker_pool *decoders;    /* one thread that reads uploaded pictures, one at a time since each takes memory */
+	struct worker_pool *decoders;    /* one thread that has uploaded pictures read, one at a time since each takes memory */
+	struct api_keys *keys;
 	struct asset_store *assets;
 	struct asset_maps *maps;
+	struct decoder *decoder;
 	struct MHD_Daemon *daemon;
 	const struct image_api *images;
 	char *pixel_version; /* everything but the question that decides about an answer's bytes */
@@ -62,6 +66,9 @@ enum service_state service_wait(struct service *service, int milliseconds);
 
 /* Takes no new work, finishes what was accepted (within a bound), stops all threads, frees everything. Takes NULL. Main thread. */
 void service_destroy(struct service *service);
+
+/* Reads keys and certificate again; what cannot be used leaves the old ones in force. false then, with lines of the log. Main thread. */
+bool service_reload(struct service *service);
 
 /* Any thread. */
 enum service_state service_state(const struct service *service);

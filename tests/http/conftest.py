@@ -61,10 +61,13 @@ class Daemon:
             command + ["--timeout-ms", str(ANSWER_SECONDS * 1000), *flags], stdout=subprocess.PIPE, stderr=self.stderr, text=True
         )
         line = self.process.stdout.readline()
-        assert line.startswith("stratusd listening on http://"), self.log.read_text(errors="replace")[-4000:]
+        assert re.match("stratusd listening on https?://", line), self.log.read_text(errors="replace")[-4000:]
         self.port = int(line.rsplit(":", 1)[1])
+        self.trust = None  # of a daemon that speaks TLS: an ssl.SSLContext
 
     def connect(self):
+        if self.trust:
+            return http.client.HTTPSConnection("127.0.0.1", self.port, timeout=ANSWER_SECONDS, context=self.trust)
         return http.client.HTTPConnection("127.0.0.1", self.port, timeout=ANSWER_SECONDS)
 
     def request(self, method, target, body=None, headers=None):

@@ -1,0 +1,299 @@
+"""Files of strangers against the daemon itself: names that would leave the folder, what others put into it, decoders that fail, and death at any moment."""
+import concurrent.futures
+import contextlib
+import http.client
+import os
+import pathlib
+import random
+import re
+import signal
+import socket
+import subprocess
+import threading
+import time
+
+import numpy
+import pytest
+
+from conftest import BUILD, ROOT, SANITIZED, Daemon, wait_for
+from test_assets import SMALL, names_of, png_by_hand
+from test_service import assert_problem
+
+GREY = png_by_hand(2, 2, b"\0\x80\x80" * 2)
+
+
+# --- names and the folder ----------------------------------------------------------------------------------------------------------
+
+OUTSIDE = [
+    b"..", b"../x", b"..%2fx", b"%2e%2e%2fx", b"%2e%2e/x", b"..%252fx", b"..%5cx", b"..\\x", b"/etc/passwd", b"%2fetc%2fpasswd", b"//etc/passwd",
+    b"a/../../x", b"a%2f..%2f..%2fx", b"./x", b"%2e", b".", b".hidden", b"a%00", b"a%00.png", b"%00", b"a\x01b", b"a%0ab", b"a%0d%0aX: y", b"a%7f",
+    b"%c0%ae%c0%ae%c0%afx", b"%ef%bc%8e%ef%bc%8e/x", b"\xc0\xae\xc0\xae\xc0\xafx", b"files/a", b"../files/outside", b"%", b"%2", b"%zz", b"~", b"a;b", b"a b", b"x" * 64,
+]  # fmt: skip
+
+
+def raw(daemon, method, target, body=b""):
+    """The status of a request whose target no library has tidied up."""
+    with socket.create_connection(("127.0.0.1", daemon.port), timeout=60) as client:
+        client.sendall(method + b" " + target + b" HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
+        answer = b""
+        with contextlib.suppress(ConnectionError):
+            while more := client.recv(65536):
+                answer += more
+    return int(answer.split(b" ", 2)[1]) if answer else 0
+
+
+def files_below(folder):
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def test_no_name_leaves_the_folder(daemon):
+    state = daemon.log.parent
+    (state / "outside").write_bytes(GREY)
+    assert daemon.request("PUT", "/v1/assets/inside", GREY).status in (201, 204)
+    before = files_below(state)
+    for name in OUTSIDE:
+        for prefix in (b"/v1/assets/", b"http://127.0.0.1/v1/assets/"):
+            target = prefix + name
+            # 404 also where the address is another than that of an asset; 400 by the library where it is none at all.
+            assert raw(daemon, b"PUT", target, GREY) in (400, 404, 405), name
+            assert raw(daemon, b"GET", target) in (400, 404, 505), name
+            assert raw(daemon, b"DELETE", target) in (400, 404, 405, 505), name
+    assert files_below(state) == before
+    for name in ("../outside", "/etc/passwd", "..", "inside/"):
+        answer = daemon.render({"clouds": {"map": name}, "output": SMALL})
+        assert_problem(answer, 422, "invalid-scene")
+    assert_problem(daemon.render({"clouds": {"map": "inside\0"}, "output": SMALL}), 400, "not-json")
+    daemon.request("DELETE", "/v1/assets/inside")
+    (state / "outside").unlink()
+
+
+def test_what_others_put_into_the_folder(daemon, tmp_path):
+    """Links, pipes, folders and plain files are no assets: they are neither read nor listed, and nothing waits for them."""
+    folder = daemon.log.parent / "state" / "assets" / "files"
+    assert daemon.request("PUT", "/v1/assets/real", GREY).status in (201, 204)
+    secret = tmp_path / "secret"
+    secret.write_bytes((folder / "real").read_bytes())
+    (folder / "link").symlink_to(secret)
+    (folder / "hop").symlink_to("real")
+    (folder / "loop").symlink_to("loop")
+    (folder / "device").symlink_to("/dev/zero")
+    (folder / "folder").mkdir()
+    (folder / "plain").write_bytes(GREY)
+    os.mkfifo(folder / "pipe")
+    odd = ["link", "hop", "loop", "device", "folder", "plain", "pipe"]
+    listed = names_of(daemon)
+    assert "real" in listed and not set(listed) & set(odd)
+    for name in odd:
+        assert_problem(daemon.get(f"/v1/assets/{name}"), 404, "not-found")
+        assert daemon.render({"clouds": {"map": name}, "output": SMALL}).pointers == {"/clouds/map"}
+    # A name is taken, not what it points at.
+    for name in ("link", "hop", "loop", "device", "plain", "pipe"):
+        assert daemon.request("PUT", f"/v1/assets/{name}", GREY).status == 201
+        assert daemon.get(f"/v1/assets/{name}").body == GREY and not (folder / name).is_symlink()
+        assert daemon.request("DELETE", f"/v1/assets/{name}").status == 204
+    assert secret.exists() and daemon.get("/v1/assets/real").body == GREY
+    (folder / "link").symlink_to(secret)
+    assert daemon.request("DELETE", "/v1/assets/link").status == 204
+    assert secret.exists()
+    assert daemon.request("PUT", "/v1/assets/folder", GREY).status == 500
+    (folder / "folder").rmdir()
+    daemon.request("DELETE", "/v1/assets/real")
+
+
+def test_bad_pictures_are_known_early(daemon):
+    """By their first bytes and by their header, however much is said to follow: nothing is decoded and nothing is kept."""
+    wide = png_by_hand(100000, 4, b"\0" * 100)
+    for data, status, kind in ((b"GIF89a" + bytes(1 << 20), 415, "unsupported-media-type"), (wide, 422, "invalid-asset")):
+        began = time.monotonic()
+        assert_problem(daemon.request("PUT", "/v1/assets/bad", data), status, kind)
+        assert time.monotonic() - began < 10
+    assert not any((daemon.log.parent / "state" / "assets" / "incoming").iterdir())
+
+
+# --- decoders that fail --------------------------------------------------------------------------------------------------------------
+
+FAULTY_MODULE = """
+#include "renderer/image/image.h"
+#include <dlfcn.h>
+#include <stdlib.h>
+
+static const struct image_api *real;
+
+/* The image module, but for pictures of some widths. */
+static bool decode(int fd, const struct picture_file *file, image_rows_taker *take, void *context, char *error, size_t size)
+{
+	if (file->width == 13)
+		abort();
+	while (file->width == 17)
+		__asm__ volatile("");
+	return real->decode(fd, file, take, context, error, size);
+}
+
+const struct image_api *stratus_image_api(void);
+const struct image_api *stratus_image_api(void)
+{
+	static struct image_api faulty;
+	void *module = dlopen(REAL, RTLD_NOW | RTLD_LOCAL);
+	const struct image_api *(*entry)(void);
+	if (!module)
+		return NULL;
+	*(void **)&entry = dlsym(module, "stratus_image_api");
+	real = entry();
+	faulty = *real;
+	faulty.decode = decode;
+	return &faulty;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory):
+    """A daemon whose library fails on pictures 13 and 17 wide; one 13 wide was stored before it began to fail."""
+    folder = tmp_path_factory.mktemp("faulty")
+    source, module = folder / "faulty.c", folder / "faulty.so"
+    source.write_text(FAULTY_MODULE.replace("REAL", f'"{BUILD / "stratus-image.so"}"'))
+    subprocess.run(["gcc", "-std=c17", "-D_GNU_SOURCE", "-shared", "-fPIC", f"-I{ROOT}", source, "-o", module, "-ldl"], check=True, timeout=120)
+    earlier = Daemon(folder)
+    assert earlier.request("PUT", "/v1/assets/earlier", strip(13)).status == 201
+    earlier.stop()
+    earlier.assert_clean()
+    daemon = Daemon(folder, "--image-module", str(module))
+    yield daemon
+    status = daemon.stop()
+    daemon.assert_clean()
+    assert status == 0
+
+
+def strip(width):
+    return png_by_hand(width, 1, b"\0" + b"\x80" * width)
+
+
+def decoder_of(daemon):
+    """The id of its process; 0: there is none."""
+    children = pathlib.Path(f"/proc/{daemon.process.pid}/task").glob("*/children")
+    found = [int(pid) for path in children for pid in path.read_text().split()]
+    return next((pid for pid in found if b"--decoder-process" in pathlib.Path(f"/proc/{pid}/cmdline").read_bytes()), 0)
+
+
+def test_failing_decoder_costs_one_upload(faulty):
+    assert faulty.request("PUT", "/v1/assets/good", strip(4)).status == 201
+    process = decoder_of(faulty)
+    for _ in range(3):
+        crashed = faulty.request("PUT", "/v1/assets/bad", strip(13))
+        assert_problem(crashed, 422, "invalid-asset")
+        assert crashed.json["detail"] == "The picture makes its decoder fail."
+    assert faulty.request("PUT", "/v1/assets/good", strip(5)).status == 204
+    assert decoder_of(faulty) == process != 0  # the copy that had the picture has died, nothing else
+    assert_problem(faulty.get("/v1/assets/bad"), 404, "not-found")
+    assert not any((faulty.log.parent / "state" / "assets" / "incoming").iterdir())
+    assert faulty.log.read_text().count("warning decoder: ") == 3
+    assert faulty.render({"clouds": {"map": "good"}, "output": SMALL}).status == 200
+
+
+def test_hanging_decoder_ends_with_the_deadline(faulty):
+    began = time.monotonic()
+    late = faulty.request("PUT", "/v1/assets/bad", strip(17), {"X-Timeout-Ms": "1000"})
+    assert_problem(late, 504, "deadline-passed")
+    assert time.monotonic() - began < 30
+    # It is over, and not only given up.
+    assert wait_for(lambda: not pathlib.Path(f"/proc/{decoder_of(faulty)}/task/{decoder_of(faulty)}/children").read_text().strip())
+    assert faulty.request("PUT", "/v1/assets/good", strip(4)).status in (201, 204)
+
+
+def test_renders_go_on_beside_it(faulty):
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        hanging = pool.submit(faulty.request, "PUT", "/v1/assets/bad", strip(17), {"X-Timeout-Ms": "3000"})
+        assert wait_for(lambda: faulty.metric("stratus_requests_in_flight") > 1)
+        assert faulty.render({"output": SMALL, "sun": {"elevation_deg": 21}}).status == 200
+        assert hanging.result().status == 504
+
+
+def test_stored_picture_that_cannot_be_read_any_more(faulty):
+    answer = faulty.render({"clouds": {"map": "earlier"}, "output": SMALL})
+    assert answer.status == 500 and "decoder" not in answer.body.decode()
+    assert faulty.render({"output": SMALL}).status == 200
+
+
+def test_decoder_has_nothing_of_the_daemon(faulty):
+    """Neither its descriptors nor its environment, and no way to more rights."""
+    assert faulty.request("PUT", "/v1/assets/good", strip(4)).status in (201, 204)
+    process = pathlib.Path(f"/proc/{decoder_of(faulty)}")
+    assert {int(path.name) for path in (process / "fd").iterdir()} <= {0, 1, 2, 3}
+    names = {variable.split(b"=")[0].decode() for variable in (process / "environ").read_bytes().split(b"\0") if variable}
+    assert all(re.match("LD_|[A-Z]*SAN_", name) for name in names)
+    status = (process / "status").read_text()
+    assert re.search(r"^NoNewPrivs:\s1$", status, re.M)
+    # Killed while it waits, it is replaced and nobody notices.
+    os.kill(int(process.name), signal.SIGKILL)
+    assert wait_for(lambda: decoder_of(faulty) == 0 or (process / "status").read_text().find("zombie") > 0)
+    assert faulty.request("PUT", "/v1/assets/good", strip(5)).status == 204
+    assert decoder_of(faulty) not in (0, int(process.name))
+
+
+# --- death at any moment -------------------------------------------------------------------------------------------------------------
+
+# More of them, such as 50, for a proof rather than a test.
+KILLS = int(os.environ.get("STRATUS_KILLS", "2" if SANITIZED else "3"))
+
+
+def noise(seed):
+    rows = numpy.random.default_rng(seed).integers(0, 256, (150, 151), dtype=numpy.uint8)
+    rows[:, 0] = 0  # the filter
+    return png_by_hand(150, 150, rows.tobytes())
+
+
+def test_killed_again_and_again(tmp_path):
+    """Under every name is one of the pictures that were sent for it, whole, or none; what was answered is there; nothing is left beside."""
+    names = ["one", "two", "three"]
+    versions = [noise(seed) for seed in range(5)]
+    source = random.Random(1)
+    kept = {}  # what each name must hold at least: the last that was answered, or what was under way behind it
+    interrupted = 0
+    decoder = 0
+    for _ in range(KILLS):
+        daemon = Daemon(tmp_path)
+        try:
+            assert not decoder or wait_for(lambda: not pathlib.Path(f"/proc/{decoder}").exists())
+            incoming = tmp_path / "state" / "assets" / "incoming"
+            assert not incoming.exists() or not any(incoming.iterdir())
+            listed = {asset["name"]: asset for asset in daemon.get("/v1/assets").json["assets"]}
+            assert set(listed) <= set(names)
+            for name in names:
+                got = daemon.get(f"/v1/assets/{name}")
+                body = got.body if got.status == 200 else None
+                assert body in kept.get(name, [None]), name
+                assert (body is None) == (name not in listed)
+            stop = threading.Event()
+            under_way = {}
+
+            def change(name, seed):
+                own = random.Random(seed)
+                while not stop.is_set():
+                    version = own.choice(versions + [None])
+                    under_way[name] = version
+                    with contextlib.suppress(OSError, http.client.HTTPException):
+                        answer = daemon.request("DELETE", f"/v1/assets/{name}") if version is None else daemon.request("PUT", f"/v1/assets/{name}", version)
+                        assert answer.status in (201, 204, 404)
+                        kept[name] = [version]
+                        under_way.pop(name)
+
+            for name in names:
+                kept[name] = kept.get(name, [None])
+            with concurrent.futures.ThreadPoolExecutor(len(names)) as pool:
+                running = [pool.submit(change, name, source.random()) for name in names]
+                wait_for(lambda: decoder_of(daemon), 20)
+                time.sleep(0.2 + 0.3 * source.random())
+                decoder = decoder_of(daemon)
+                daemon.process.send_signal(signal.SIGKILL)
+                stop.set()
+                for done in running:
+                    done.result()
+            for name, version in under_way.items():
+                kept[name] = kept[name] + [version]
+            interrupted += len(under_way)
+        finally:
+            daemon.process.kill()
+            daemon.stop()
+            daemon.assert_clean()
+    assert interrupted > 0
+    assert wait_for(lambda: not pathlib.Path(f"/proc/{decoder}").exists())

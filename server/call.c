@@ -1,5 +1,7 @@
 #include "server/call.h"
 
+#include "renderer/log.h"
+#include "server/admission.h"
 #include "server/clock.h"
 #include "server/response.h"
 #include "server/service.h"
@@ -56,12 +58,17 @@ enum call_outcome call_reason_to_stop(const struct request *request, double dead
 
 void call_end_render(struct request *request, const struct render_job *job)
 {
+	log_debug("request %s: %.1f ms of the renderer were predicted, it took %.1f", request->id, job->predicted_ms, job->spent_ms);
 	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
 						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
 						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
 						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
 	if (job->outcome != RENDER_OUTCOME_OK)
-		metrics_count_end(request->service->metrics, ends[job->outcome]);
+		metrics_count_end(request->service->metrics, ends[job->outcome], job->spent_ms);
+	else if (job->predicted_ms > 0)
+		metrics_count_prediction(request->service->metrics, job->spent_ms / job->predicted_ms);
+	if (job->outcome == RENDER_OUTCOME_ABANDONED)
+		metrics_count_cancellation(request->service->metrics, job->phase);
 	request_resume(request);
 }
 
@@ -72,14 +79,10 @@ enum MHD_Result call_refuse_computing(struct request *request)
 					 request->service->config->queue_length);
 }
 
-enum MHD_Result call_refuse_render(struct request *request)
+enum MHD_Result call_refuse_render(struct request *request, const struct render_job *job)
 {
-	const struct service *service = request->service;
-	if (service->stopping)
-		return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
-	metrics_count_rejection(service->metrics, REJECTED_FULL);
-	return response_send_new_problem(request, PROBLEM_QUEUE_FULL, "%d renders are waiting, and no more may.",
-					 service->config->queue_length);
+	admission_refuse(request, job);
+	return response_send_problem(request);
 }
 
 enum MHD_Result call_send_failure(struct request *request, enum call_outcome outcome, const char *what)

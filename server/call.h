@@ -50,7 +50,7 @@ void call_end_render(struct request *request, const struct render_job *job);
 /* The calls that computers work for are too many. */
 enum MHD_Result call_refuse_computing(struct request *request);
 /* The renders are too many, or a shutdown closed their queue. */
-enum MHD_Result call_refuse_render(struct request *request);
+enum MHD_Result call_refuse_render(struct request *request, const struct render_job *job);
 
 /* Why there is none. what: that would be the answer, such as "The image". */
 enum MHD_Result call_send_failure(struct request *request, enum call_outcome outcome, const char *what);

@@ -33,6 +33,16 @@ struct config {
 	int log_level;            /* enum log_level */
 	int log_format;           /* enum log_format */
 
+	/* Limits (docs/operations.md). */
+	int queue_mpixels;           /* 1..1048576; megapixels that may wait */
+	int memory_mb;               /* 64..16777216; of pictures in work */
+	int picture_mpixels;         /* 1..64; 2^20 pixels of one picture, layers counted apart */
+	int connections;             /* 1..65536 */
+	int connections_per_address; /* 1..65536 */
+	int header_max_kb;           /* 1..1024 */
+	int body_max_kb;             /* 1..65536; of a scene */
+	int read_timeout_s;          /* 1..3600; for a request to be complete */
+
 	char state_dir_buffer[4096]; /* holds the default of state_dir */
 };
 

@@ -4,6 +4,7 @@
 #include "server/access.h"
 #include "server/clock.h"
 #include "server/cors.h"
+#include "server/framing.h"
 #include "server/negotiation.h"
 #include "server/request_log.h"
 #include "server/response.h"
@@ -17,16 +18,47 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-/* Request line and headers of one connection, and those of its answer, share this much. */
-enum { CONNECTION_MEMORY = 64 << 10, CONNECTIONS_MAX = 1024, IDLE_SECONDS = 30, HTTP_THREADS = 2 };
+enum { IDLE_SECONDS = 30, HTTP_THREADS = 2, DESCRIPTORS_BESIDE = 256 };
+
+/* Request line and headers of one connection, and those of its answer, share this much: enough to read what is too large, and say so. */
+static size_t connection_memory(const struct config *config)
+{
+	return 2 * ((size_t)config->header_max_kb << 10) + (32 << 10);
+}
+
+static size_t body_max(const struct request *request)
+{
+	return (size_t)request->service->config->body_max_kb << 10;
+}
 
 static void *on_target(void *context, const char *target, struct MHD_Connection *connection)
 {
-	(void)connection;
-	return request_create(context, target);
+	const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+	return request_create(context, info ? info->socket_context : NULL, target);
+}
+
+static enum MHD_Result on_accept(void *context, const struct sockaddr *address, socklen_t size)
+{
+	struct service *service = context;
+	(void)size;
+	return connections_accept(service->connections, address) ? MHD_YES : MHD_NO;
+}
+
+static void on_connection(void *context, struct MHD_Connection *connection, void **socket_context, enum MHD_ConnectionNotificationCode code)
+{
+	struct service *service = context;
+	if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
+		connection_close(*socket_context);
+		*socket_context = NULL;
+		return;
+	}
+	const union MHD_ConnectionInfo *fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+	const union MHD_ConnectionInfo *address = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+	*socket_context = fd ? connection_open(service->connections, fd->connect_fd, address ? address->client_addr : NULL) : NULL;
 }
 
 static bool allows(const struct route *route, const char *method)
@@ -50,7 +82,30 @@ static bool is_encoded(const struct request *request)
 static bool announces_too_much(const struct request *request)
 {
 	const char *length = request_header(request, "Content-Length");
-	return length && strtoull(length, NULL, 10) > REQUEST_BODY_MAX;
+	return length && strtoull(length, NULL, 10) > body_max(request);
+}
+
+static bool has_large_headers(const struct request *request)
+{
+	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+	return info && info->header_size > (size_t)request->service->config->header_max_kb << 10;
+}
+
+/* Beyond its limits the service still says how it is. */
+static bool is_probe(const struct request *request)
+{
+	const enum metrics_route route = request->route->metrics;
+	return route == ROUTE_HEALTHZ || route == ROUTE_READYZ || route == ROUTE_METRICS;
+}
+
+static enum MHD_Result refuse_connection(struct request *request)
+{
+	const struct config *config = request->service->config;
+	metrics_count_rejection(request->service->metrics, REJECTED_CONNECTIONS);
+	return response_send_new_problem(
+		request, PROBLEM_CONNECTIONS,
+		"At most %d connections at a time (--connections), %d of each address (--connections-per-address).", config->connections,
+		config->connections_per_address);
 }
 
 /* The headers are in: what is wrong already is answered before a body is read. */
@@ -63,6 +118,18 @@ static enum MHD_Result begin(struct request *request, const char *method)
 	snprintf(request->method, sizeof request->method, "%s", method);
 	request->route = routes_find(request->path);
 	request->next = request->route->handler;
+	connection_expect_body(request->socket);
+	const char *fault = framing_fault(request->connection);
+	if (fault) {
+		request->closes = true;
+		return response_send_new_problem(request, PROBLEM_BAD_REQUEST, "%s", fault);
+	}
+	if (has_large_headers(request))
+		return response_send_new_problem(request, PROBLEM_HEADERS,
+						 "Request line and headers have at most %d KiB (--header-max-kb).",
+						 request->service->config->header_max_kb);
+	if (connection_is_surplus(request->socket) && !is_probe(request))
+		return refuse_connection(request);
 	enum MHD_Result answered;
 	if (cors_answer_preflight(request, &answered) || !access_admit(request, &answered))
 		return answered;
@@ -78,16 +145,18 @@ static enum MHD_Result begin(struct request *request, const char *method)
 	if (request->is_put)
 		return route_asset_begin(request);
 	if (announces_too_much(request))
-		return response_send_new_problem(request, PROBLEM_TOO_LARGE, "A body has at most %d bytes.", REQUEST_BODY_MAX);
+		return response_send_new_problem(request, PROBLEM_TOO_LARGE, "A body has at most %zu bytes (--body-max-kb).",
+						 body_max(request));
 	return MHD_YES;
 }
 
 static enum MHD_Result take_body(struct request *request, const char *data, size_t size)
 {
+	connection_receive(request->socket, size);
 	if (request->is_put)
 		return route_asset_take(request, data, size);
-	if (request->body.length + size > REQUEST_BODY_MAX)
-		return response_refuse_body(request, REQUEST_BODY_MAX);
+	if (request->body.length + size > body_max(request))
+		return response_refuse_body(request, body_max(request));
 	text_append(&request->body, data, size);
 	return MHD_YES;
 }
@@ -108,6 +177,7 @@ static enum MHD_Result on_access(void *context, struct MHD_Connection *connectio
 		*size = 0;
 		return result;
 	}
+	connection_work(request->socket);
 	/* Whole now: from here on a shutdown waits for its answer. */
 	if (!request->is_accepted)
 		request->service->in_flight++;
@@ -123,16 +193,19 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	if (!request)
 		return;
 	double took = clock_now_ms() - request->started_ms;
-	unsigned status = request->status ? request->status : 499;
+	unsigned status = request->status ? request->status : connection_is_slow(request->socket) ? 408 : 499;
 	enum metrics_route route = request->route ? request->route->metrics : ROUTE_OTHER;
 	if (request->is_head)
 		request->bytes = 0; /* those that a GET would send */
 	/* Without a method: the headers never came, or libmicrohttpd refused them by itself. */
+	if (!request->status && status == 408)
+		metrics_count_problem(service->metrics, PROBLEM_READ_TIMEOUT);
 	metrics_count_request(service->metrics, route, status, took, request->bytes);
 	access_end(request, status);
 	request_log(request, status, took);
 	if (request->is_accepted)
 		service->in_flight--;
+	connection_end(request->socket);
 	request_destroy(request);
 	*state = NULL;
 }
@@ -239,20 +312,36 @@ static struct MHD_Daemon *start_daemon(struct service *service, const struct add
 	unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG;
 	if (address->ai_family == AF_INET6)
 		flags |= MHD_USE_IPv6;
-	if (service->config->tls_cert)
+	const struct config *config = service->config;
+	const unsigned most = (unsigned)config->connections + CONNECTIONS_SURPLUS;
+	if (config->tls_cert)
 		flags |= MHD_USE_TLS;
 	/* Options end where the certificate's would begin when there is none. */
-	const enum MHD_OPTION certificate = service->config->tls_cert ? MHD_OPTION_HTTPS_CERT_CALLBACK2 : MHD_OPTION_END;
-	return MHD_start_daemon(flags, 0, NULL, NULL, on_access, service, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, NULL,
+	const enum MHD_OPTION certificate = config->tls_cert ? MHD_OPTION_HTTPS_CERT_CALLBACK2 : MHD_OPTION_END;
+	return MHD_start_daemon(flags, 0, on_accept, service, on_access, service, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, NULL,
 				MHD_OPTION_SOCK_ADDR, address->ai_addr, MHD_OPTION_URI_LOG_CALLBACK, on_target, service,
-				MHD_OPTION_NOTIFY_COMPLETED, on_completed, service, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-				(size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT, (unsigned)CONNECTIONS_MAX,
-				MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_SECONDS, MHD_OPTION_THREAD_POOL_SIZE, (unsigned)HTTP_THREADS,
-				certificate, tls_retrieve, MHD_OPTION_HTTPS_PRIORITIES, TLS_PRIORITIES, MHD_OPTION_END);
+				MHD_OPTION_NOTIFY_CONNECTION, on_connection, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed, service,
+				MHD_OPTION_CONNECTION_MEMORY_LIMIT, connection_memory(config), MHD_OPTION_CONNECTION_LIMIT,
+				most * HTTP_THREADS, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_SECONDS, MHD_OPTION_THREAD_POOL_SIZE,
+				(unsigned)HTTP_THREADS, certificate, tls_retrieve, MHD_OPTION_HTTPS_PRIORITIES, TLS_PRIORITIES, MHD_OPTION_END);
+}
+
+/* A process is often given fewer descriptors than it may have. */
+static void raise_descriptors(const struct config *config)
+{
+	struct rlimit limit;
+	const rlim_t wanted = (rlim_t)config->connections + CONNECTIONS_SURPLUS + DESCRIPTORS_BESIDE;
+	if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted)
+		return;
+	limit.rlim_cur = limit.rlim_max < wanted ? limit.rlim_max : wanted;
+	if (setrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur < wanted)
+		log_warning("--connections %d: the process may open %llu files only", config->connections,
+			    (unsigned long long)limit.rlim_cur);
 }
 
 bool http_start(struct service *service)
 {
+	raise_descriptors(service->config);
 	char host[sizeof service->host - 2];
 	struct addrinfo *address = resolve(service->config->listen, host, sizeof host, false);
 	if (!address)

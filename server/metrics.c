@@ -15,13 +15,17 @@
 static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/compare", "/v1/optics",      "/v1/slab",    "/v1/sky",
 						     "/v1/sun",       "/v1/assets",  "/v1/assets/NAME", "/v1/presets", "/",
 						     "/openapi.yaml", "/healthz",    "/readyz",         "/metrics",    "other"};
-static const char *const rejection_names[REJECTION_COUNT] = {"full", "starting", "shutting_down"};
+static const char *const rejection_names[REJECTION_COUNT] = {"full",        "pixels",   "predicted_late", "memory",
+							     "connections", "starting", "shutting_down"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
+static const char *const phase_names[RENDER_PHASE_COUNT] = {
+	[RENDER_PHASE_QUEUED] = "queued", [RENDER_PHASE_RENDERING] = "rendering", [RENDER_PHASE_ENCODING] = "encoding"};
 static const char *const source_names[DROPLET_SOURCE_COUNT] = {
 	[DROPLETS_FROM_MEMORY] = "memory", [DROPLETS_FROM_DISK] = "disk", [DROPLETS_COMPUTED] = "computed"};
 
 /* Every status that is sent; the last stands for all others. */
-static const unsigned statuses[] = {200, 201, 204, 304, 400, 401, 404, 405, 406, 412, 413, 415, 422, 429, 499, 500, 503, 504, 507, 0};
+static const unsigned statuses[] = {200, 201, 204, 304, 400, 401, 404, 405, 406, 408, 412,
+				    413, 415, 422, 429, 431, 499, 500, 503, 504, 507, 0};
 enum { STATUS_COUNT = sizeof statuses / sizeof *statuses };
 
 enum { BOUND_COUNT = 16 };
@@ -29,6 +33,9 @@ enum { BOUND_COUNT = 16 };
 static const double time_bounds[BOUND_COUNT] = {0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60};
 /* In pixels: thumbnails to a quarter of the largest picture. */
 static const double pixel_bounds[BOUND_COUNT] = {1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 4e6, 8e6, 16e6, 32e6, 64e6};
+
+/* Of a measured time to its prediction. */
+static const double ratio_bounds[BOUND_COUNT] = {0.1, 0.2, 0.33, 0.5, 0.67, 0.8, 0.9, 1, 1.1, 1.25, 1.5, 2, 3, 5, 10, 20};
 
 struct histogram {
 	unsigned long buckets[BOUND_COUNT + 1];
@@ -46,6 +53,9 @@ struct metrics {
 	unsigned long reused[TIMING_COUNT];
 	unsigned long rejected[REJECTION_COUNT];
 	unsigned long ended[END_COUNT];
+	unsigned long cancelled[RENDER_PHASE_COUNT];
+	double wasted_ms[END_COUNT];
+	struct histogram predictions;
 	unsigned long tracings_ended[END_COUNT];
 	double photons;
 	double started_s; /* Unix time */
@@ -125,10 +135,25 @@ void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection rea
 	pthread_mutex_unlock(&metrics->mutex);
 }
 
-void metrics_count_end(struct metrics *metrics, enum metrics_end end)
+void metrics_count_end(struct metrics *metrics, enum metrics_end end, double spent_ms)
 {
 	pthread_mutex_lock(&metrics->mutex);
 	metrics->ended[end]++;
+	metrics->wasted_ms[end] += spent_ms;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_cancellation(struct metrics *metrics, enum render_phase at)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->cancelled[at]++;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_prediction(struct metrics *metrics, double ratio)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	observe(&metrics->predictions, ratio_bounds, ratio);
 	pthread_mutex_unlock(&metrics->mutex);
 }
 
@@ -256,6 +281,35 @@ static void write_queue(struct text *text, const struct metrics *metrics, const 
 	write_family(text, "renders_ended", "counter", "Accepted renders that brought no picture, by reason.");
 	for (int i = 0; i < END_COUNT; i++)
 		text_printf(text, "stratus_renders_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->ended[i]);
+	write_family(text, "wasted_render_seconds", "counter", "Time of the renderer on those, by reason.");
+	for (int i = 0; i < END_COUNT; i++)
+		text_printf(text, "stratus_wasted_render_seconds_total{reason=\"%s\"} %.3f\n", end_names[i], metrics->wasted_ms[i] * 1e-3);
+	write_family(text, "cancelled", "counter", "Those of them that nobody waited for any more, by how far they had come.");
+	for (int i = 0; i < RENDER_PHASE_COUNT; i++)
+		text_printf(text, "stratus_cancelled_total{at=\"%s\"} %lu\n", phase_names[i], metrics->cancelled[i]);
+}
+
+static void write_admission(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
+{
+	write_family(text, "queue_backlog_seconds", "gauge", "Time that renders will take that wait or run, as predicted.");
+	text_printf(text, "stratus_queue_backlog_seconds %.3f\n", now->backlog_ms * 1e-3);
+	write_family(text, "queue_pixels_limit", "gauge", "Pixels of renders that may wait for each.");
+	text_printf(text, "stratus_queue_pixels_limit %.0f\n", now->queue_pixels_limit);
+	write_family(text, "render_prediction_ratio", "histogram", "Time that a render took over what was predicted.");
+	write_histogram(text, "render_prediction_ratio", "", &metrics->predictions, ratio_bounds);
+	write_family(text, "picture_memory_bytes", "gauge", "Memory promised to pictures in work.");
+	text_printf(text, "stratus_picture_memory_bytes %zu\n", now->memory_bytes);
+	write_family(text, "picture_memory_limit_bytes", "gauge", "Memory that may be promised.");
+	text_printf(text, "stratus_picture_memory_limit_bytes %zu\n", now->memory_limit);
+	write_family(text, "connections", "gauge", "Open connections.");
+	text_printf(text, "stratus_connections %zu\n", now->connections.open);
+	write_family(text, "connections_limit", "gauge", "Connections that may be open for more than probes and metrics.");
+	text_printf(text, "stratus_connections_limit %zu\n", now->connections_limit);
+	write_family(text, "connections_dropped", "counter",
+		     "Connections closed at once, served probes alone, or closed for their slowness.");
+	text_printf(text, "stratus_connections_dropped_total{reason=\"refused\"} %llu\n", now->connections.refused);
+	text_printf(text, "stratus_connections_dropped_total{reason=\"surplus\"} %llu\n", now->connections.surplus);
+	text_printf(text, "stratus_connections_dropped_total{reason=\"slow\"} %llu\n", now->connections.slow);
 }
 
 static void write_tracings(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
@@ -421,6 +475,7 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_answers(&text, copy);
 	write_stages(&text, copy);
 	write_queue(&text, copy, now);
+	write_admission(&text, copy, now);
 	write_tracings(&text, copy, now);
 	write_droplets(&text, &now->droplets);
 	write_assets(&text, now);

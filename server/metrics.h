@@ -8,7 +8,9 @@
 
 #include "renderer/droplet_store.h"
 #include "server/api_keys.h"
+#include "server/connections.h"
 #include "server/problem.h"
+#include "server/render_queue.h"
 #include "server/server_timing.h"
 
 #include <time.h>
@@ -32,7 +34,16 @@ enum metrics_route {
 	ROUTE_COUNT
 };
 
-enum metrics_rejection { REJECTED_FULL, REJECTED_STARTING, REJECTED_SHUTTING_DOWN, REJECTION_COUNT };
+enum metrics_rejection {
+	REJECTED_FULL,
+	REJECTED_PIXELS,
+	REJECTED_LATE,
+	REJECTED_MEMORY,
+	REJECTED_CONNECTIONS,
+	REJECTED_STARTING,
+	REJECTED_SHUTTING_DOWN,
+	REJECTION_COUNT
+};
 enum metrics_end { ENDED_EXPIRED, ENDED_ABANDONED, ENDED_FAILED, END_COUNT };
 
 struct metrics;
@@ -49,8 +60,11 @@ void metrics_count_picture(struct metrics *metrics, double pixels);
 /* The stages of an answered render. Stages taken from memory are counted apart: their zeros would hide what the work costs. */
 void metrics_count_timings(struct metrics *metrics, const struct timings *timings);
 void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection reason);
-/* Renders that were accepted and brought no picture. */
-void metrics_count_end(struct metrics *metrics, enum metrics_end end);
+/* Renders that were accepted and brought no picture, and what the render thread spent on them. */
+void metrics_count_end(struct metrics *metrics, enum metrics_end end, double spent_ms);
+/* Those of them that nobody waited for any more, by how far they came; and what a render took over what was predicted. */
+void metrics_count_cancellation(struct metrics *metrics, enum render_phase at);
+void metrics_count_prediction(struct metrics *metrics, double ratio);
 /* Photons traced to their end, and tracings that were accepted and brought no numbers. */
 void metrics_count_photons(struct metrics *metrics, double photons);
 void metrics_count_tracing_end(struct metrics *metrics, enum metrics_end end);
@@ -60,7 +74,9 @@ struct metrics_now {
 	const struct renderer_info *info;
 	bool ready; /* as /readyz says it */
 	size_t queue_depth, queue_limit, requests_in_flight;
-	double queue_pixels;
+	double queue_pixels, queue_pixels_limit, backlog_ms;
+	struct connections_counts connections;
+	size_t connections_limit, memory_bytes, memory_limit;
 	size_t tracings_waiting, tracings_limit;
 	struct droplet_store_counts droplets;
 	struct api_keys *keys;

@@ -114,7 +114,9 @@ static bool prepare(struct preparation *preparation, struct render_job *job)
 
 static void run(struct preparation *preparation, struct render_job *job)
 {
-	if (prepare(preparation, job))
+	const bool ready = prepare(preparation, job);
+	render_queue_settle(preparation->waiting, job, job->prepared_ms);
+	if (ready)
 		render_queue_pass(preparation->queue, job);
 	else
 		job->finished(job);
@@ -141,7 +143,7 @@ static void *prepare_all(void *argument)
 
 /* --- life ------------------------------------------------------------------------------------------------------------------------- */
 
-struct preparation *preparation_create(struct droplet_store *store, struct render_queue *queue, size_t limit)
+struct preparation *preparation_create(struct droplet_store *store, struct render_queue *queue, const struct render_queue_limits *limits)
 {
 	struct preparation *preparation = calloc(1, sizeof *preparation);
 	if (!preparation) {
@@ -150,7 +152,7 @@ struct preparation *preparation_create(struct droplet_store *store, struct rende
 	}
 	preparation->store = store;
 	preparation->queue = queue;
-	preparation->waiting = render_queue_create(limit);
+	preparation->waiting = render_queue_create(limits);
 	if (preparation->waiting && pthread_create(&preparation->thread, NULL, prepare_all, preparation) == 0)
 		return preparation;
 	log_error("preparation_create: no queue or no thread");
@@ -167,6 +169,23 @@ void preparation_destroy(struct preparation *preparation)
 	pthread_join(preparation->thread, NULL);
 	render_queue_destroy(preparation->waiting);
 	free(preparation);
+}
+
+static bool is_over(struct render_job *job, void *context)
+{
+	(void)context;
+	return render_job_is_over(job);
+}
+
+void preparation_drop_over(struct preparation *preparation)
+{
+	for (struct render_job *job; (job = render_queue_remove(preparation->waiting, is_over, NULL));)
+		job->finished(job);
+}
+
+bool preparation_needs(const struct preparation *preparation, const struct scene *scene)
+{
+	return scene_has_clouds(scene) && !droplet_store_has(preparation->store, &scene->dsd, scene->model.optics, needs_fit(scene));
 }
 
 size_t preparation_depth(struct preparation *preparation)

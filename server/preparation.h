@@ -12,8 +12,8 @@
 
 struct preparation;
 
-/* limit: jobs waiting at most, from 1. Both others must outlive it. NULL (and a log line) on failure. */
-struct preparation *preparation_create(struct droplet_store *store, struct render_queue *queue, size_t limit);
+/* limits: of the jobs that wait. The others must outlive it. NULL (and a log line) on failure. */
+struct preparation *preparation_create(struct droplet_store *store, struct render_queue *queue, const struct render_queue_limits *limits);
 
 /* Ends, or passes on, all jobs that were taken. Takes NULL. */
 void preparation_destroy(struct preparation *preparation);
@@ -27,6 +27,12 @@ void preparation_pass(struct preparation *preparation, struct render_job *job);
 
 /* The renderer needs the job's tables no longer. Once or more for every job; any thread. */
 void preparation_release(struct preparation *preparation, struct render_job *job);
+
+/* Ends the waiting jobs that are over. Any thread. */
+void preparation_drop_over(struct preparation *preparation);
+
+/* Would a scene have to wait for its droplets? Any thread. */
+bool preparation_needs(const struct preparation *preparation, const struct scene *scene);
 
 /* Jobs waiting now, those in the render queue apart, and their pixels. Any thread. */
 size_t preparation_depth(struct preparation *preparation);

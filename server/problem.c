@@ -3,6 +3,7 @@
 #include "renderer/log.h"
 
 #include <jansson.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,16 +25,21 @@ static const struct kind kinds[PROBLEM_KIND_COUNT] = {
 	[PROBLEM_METHOD] = {405, "method-not-allowed", "Method not allowed"},
 	[PROBLEM_NOT_ACCEPTABLE] = {406, "not-acceptable", "No acceptable type"},
 	[PROBLEM_PRECONDITION] = {412, "precondition-failed", "The condition does not hold"},
+	[PROBLEM_READ_TIMEOUT] = {408, "request-timeout", "The request came too slowly"},
 	[PROBLEM_TOO_LARGE] = {413, "body-too-large", "The body is too large"},
 	[PROBLEM_MEDIA_TYPE] = {415, "unsupported-media-type", "Unsupported media type"},
 	[PROBLEM_INVALID] = {422, "invalid-scene", "Invalid parameters"},
 	[PROBLEM_BAD_ASSET] = {422, "invalid-asset", "The picture cannot be used"},
 	[PROBLEM_ALLOWANCE] = {429, "allowance-used-up", "More than this key may ask for"},
+	[PROBLEM_HEADERS] = {431, "headers-too-large", "The headers are too large"},
 	[PROBLEM_INTERNAL] = {500, "internal", "Internal error"},
 	[PROBLEM_RENDER_FAILED] = {500, "render-failed", "The image could not be made"},
 	[PROBLEM_QUEUE_FULL] = {503, "queue-full", "Too much to do"},
 	[PROBLEM_TRACINGS_FULL] = {503, "queue-full", "Too much to do"},
 	[PROBLEM_COMPUTERS_FULL] = {503, "queue-full", "Too much to do"},
+	[PROBLEM_PREDICTED_LATE] = {503, "predicted-late", "Not to be done in time"},
+	[PROBLEM_MEMORY_LIMIT] = {503, "memory-limit", "Too much memory in use"},
+	[PROBLEM_CONNECTIONS] = {503, "connection-limit", "Too many connections"},
 	[PROBLEM_NO_MEMORY] = {503, "no-memory", "No memory for this image"},
 	[PROBLEM_STARTING] = {503, "starting", "Not ready yet"},
 	[PROBLEM_SHUTTING_DOWN] = {503, "shutting-down", "Shutting down"},
@@ -147,6 +153,10 @@ char *problem_to_json(const struct problem *problem, const char *request_id, uns
 		json_object_set_new(root, "errors", errors_to_json(problem));
 	if (root && retry_after_seconds)
 		json_object_set_new(root, "retry_after_seconds", json_integer(retry_after_seconds));
+	if (root && problem->says_queue)
+		json_object_set_new(root, "queue_depth", json_integer((json_int_t)problem->queue_depth));
+	if (root && problem->predicted_ms > 0)
+		json_object_set_new(root, "predicted_ms", json_real(round(problem->predicted_ms)));
 	char *text = root ? json_dumps(root, JSON_INDENT(2)) : NULL;
 	if (!text)
 		log_error("problem: a JSON answer could not be written");

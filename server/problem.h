@@ -18,16 +18,21 @@ enum problem_kind {
 	PROBLEM_METHOD,         /* 405 */
 	PROBLEM_NOT_ACCEPTABLE, /* 406 */
 	PROBLEM_PRECONDITION,   /* 412 */
+	PROBLEM_READ_TIMEOUT,   /* 408, of what was read so far */
 	PROBLEM_TOO_LARGE,      /* 413 */
 	PROBLEM_MEDIA_TYPE,     /* 415 */
 	PROBLEM_INVALID,        /* 422, with `errors` */
 	PROBLEM_BAD_ASSET,      /* 422 */
 	PROBLEM_ALLOWANCE,      /* 429 */
+	PROBLEM_HEADERS,        /* 431 */
 	PROBLEM_INTERNAL,       /* 500 */
 	PROBLEM_RENDER_FAILED,  /* 500 */
 	PROBLEM_QUEUE_FULL,     /* 503 */
 	PROBLEM_TRACINGS_FULL,  /* 503 */
 	PROBLEM_COMPUTERS_FULL, /* 503 */
+	PROBLEM_PREDICTED_LATE, /* 503 */
+	PROBLEM_MEMORY_LIMIT,   /* 503 */
+	PROBLEM_CONNECTIONS,    /* 503 */
 	PROBLEM_NO_MEMORY,      /* 503 */
 	PROBLEM_STARTING,       /* 503 */
 	PROBLEM_SHUTTING_DOWN,  /* 503 */
@@ -50,6 +55,9 @@ struct problem {
 	enum problem_kind kind;
 	char detail[PROBLEM_DETAIL_SIZE];
 	struct problem_error errors[PROBLEM_ERRORS_MAX];
+	double predicted_ms; /* until the answer would have been there; 0: not said */
+	bool says_queue;     /* and the renders that wait */
+	size_t queue_depth;
 	size_t error_count; /* may exceed PROBLEM_ERRORS_MAX: the rest was only counted */
 };
 

@@ -3,15 +3,22 @@
 #include "renderer/log.h"
 #include "server/clock.h"
 
+#include <math.h>
 #include <pthread.h>
+#include <stddef.h>
 #include <stdlib.h>
+
+/* What is unknown counts for so much. */
+#define UNKNOWN_MS 1.0
 
 struct render_queue {
 	pthread_mutex_t mutex;
 	pthread_cond_t changed;
-	struct render_job *first, **last;
-	size_t depth, limit;
-	double pixels;
+	struct fair_order *order;
+	struct render_queue_limits limits;
+	size_t depth;
+	double pixels, waiting_ms;
+	double running_ms, running_turn_ms, running_since_ms; /* predicted of the job that runs, 0: none does; and of its turn */
 	bool closed;
 };
 
@@ -23,17 +30,20 @@ bool render_job_is_over(struct render_job *job)
 	return over;
 }
 
-struct render_queue *render_queue_create(size_t limit)
+struct render_queue *render_queue_create(const struct render_queue_limits *limits)
 {
 	struct render_queue *queue = calloc(1, sizeof *queue);
-	if (!queue) {
+	struct fair_order *order = fair_order_create();
+	if (!queue || !order) {
 		log_error("render_queue_create: out of memory");
+		fair_order_destroy(order);
+		free(queue);
 		return NULL;
 	}
 	pthread_mutex_init(&queue->mutex, NULL);
 	pthread_cond_init(&queue->changed, NULL);
-	queue->last = &queue->first;
-	queue->limit = limit;
+	queue->order = order;
+	queue->limits = *limits;
 	return queue;
 }
 
@@ -43,7 +53,13 @@ void render_queue_destroy(struct render_queue *queue)
 		return;
 	pthread_cond_destroy(&queue->changed);
 	pthread_mutex_destroy(&queue->mutex);
+	fair_order_destroy(queue->order);
 	free(queue);
+}
+
+static struct render_job *job_of(struct fair_entry *entry)
+{
+	return entry ? (struct render_job *)((char *)entry - offsetof(struct render_job, entry)) : NULL;
 }
 
 static double pixels_of(const struct render_job *job)
@@ -53,25 +69,48 @@ static double pixels_of(const struct render_job *job)
 	return job->directions ? 0 : (double)output->width * output->height * layers;
 }
 
+static double remaining_ms(const struct render_job *job)
+{
+	return fmax(job->predicted_ms - job->spent_ms, UNKNOWN_MS);
+}
+
+/* A reference takes its turns like any picture. */
+static double turn_ms(const struct render_job *job)
+{
+	const bool turns = !job->directions && job->scene->model.name == MODEL_REFERENCE;
+	return turns ? fmin(remaining_ms(job), RENDER_TURN_MS) : remaining_ms(job);
+}
+
 static void append(struct render_queue *queue, struct render_job *job)
 {
 	job->queued_ms = clock_now_ms();
-	job->next = NULL;
-	*queue->last = job;
-	queue->last = &job->next;
+	job->entry.client = job->client;
+	job->entry.cost_ms = turn_ms(job);
+	fair_order_add(queue->order, &job->entry, job->queued_ms);
 	queue->depth++;
 	queue->pixels += pixels_of(job);
+	queue->waiting_ms += remaining_ms(job);
 	pthread_cond_signal(&queue->changed);
+}
+
+static enum render_refusal refusal_of(const struct render_queue *queue, const struct render_job *job)
+{
+	if (queue->closed)
+		return RENDER_REFUSED_CLOSED;
+	if (queue->depth >= queue->limits.jobs)
+		return RENDER_REFUSED_COUNT;
+	return queue->depth > 0 && queue->pixels + pixels_of(job) > queue->limits.pixels ? RENDER_REFUSED_PIXELS : RENDER_TAKEN;
 }
 
 bool render_queue_push(struct render_queue *queue, struct render_job *job)
 {
 	pthread_mutex_lock(&queue->mutex);
-	bool accepted = !queue->closed && queue->depth < queue->limit;
-	if (accepted)
+	const enum render_refusal refusal = refusal_of(queue, job);
+	job->refusal = refusal;
+	if (refusal == RENDER_TAKEN)
 		append(queue, job);
 	pthread_mutex_unlock(&queue->mutex);
-	return accepted;
+	return refusal == RENDER_TAKEN;
 }
 
 void render_queue_pass(struct render_queue *queue, struct render_job *job)
@@ -81,27 +120,50 @@ void render_queue_pass(struct render_queue *queue, struct render_job *job)
 	pthread_mutex_unlock(&queue->mutex);
 }
 
-/* Takes the job out that `link` leads to; NULL when it leads to none. */
-static struct render_job *take(struct render_queue *queue, struct render_job **link)
+static void count_out(struct render_queue *queue, struct render_job *job)
 {
-	struct render_job *job = *link;
-	if (!job)
-		return NULL;
-	*link = job->next;
-	if (!*link)
-		queue->last = link;
 	queue->depth--;
 	queue->pixels -= pixels_of(job);
+	queue->waiting_ms = queue->depth ? queue->waiting_ms - remaining_ms(job) : 0;
 	job->waited_ms += clock_now_ms() - job->queued_ms;
+}
+
+struct wish {
+	render_job_wanted *wanted;
+	void *context;
+};
+
+static bool is_wanted(struct fair_entry *entry, void *context)
+{
+	const struct wish *wish = context;
+	return wish->wanted(job_of(entry), wish->context);
+}
+
+/* The next of the jobs; wanted NULL: of all. */
+static struct render_job *first(struct render_queue *queue, render_job_wanted *wanted, void *context)
+{
+	struct wish wish = {wanted, context};
+	return job_of(fair_order_first(queue->order, wanted ? is_wanted : NULL, &wish));
+}
+
+static struct render_job *take(struct render_queue *queue, struct render_job *job)
+{
+	if (!job)
+		return NULL;
+	count_out(queue, job);
+	queue->running_ms = remaining_ms(job);
+	queue->running_turn_ms = job->entry.cost_ms;
+	queue->running_since_ms = clock_now_ms();
+	fair_order_take(queue->order, &job->entry);
 	return job;
 }
 
 struct render_job *render_queue_pop(struct render_queue *queue)
 {
 	pthread_mutex_lock(&queue->mutex);
-	while (!queue->first && !queue->closed)
+	while (!queue->depth && !queue->closed)
 		pthread_cond_wait(&queue->changed, &queue->mutex);
-	struct render_job *job = take(queue, &queue->first);
+	struct render_job *job = take(queue, first(queue, NULL, NULL));
 	pthread_mutex_unlock(&queue->mutex);
 	return job;
 }
@@ -109,10 +171,27 @@ struct render_job *render_queue_pop(struct render_queue *queue)
 struct render_job *render_queue_pop_wanted(struct render_queue *queue, render_job_wanted *wanted, void *context)
 {
 	pthread_mutex_lock(&queue->mutex);
-	struct render_job **link = &queue->first;
-	while (*link && !wanted(*link, context))
-		link = &(*link)->next;
-	struct render_job *job = take(queue, link);
+	struct render_job *job = take(queue, first(queue, wanted, context));
+	pthread_mutex_unlock(&queue->mutex);
+	return job;
+}
+
+void render_queue_settle(struct render_queue *queue, struct render_job *job, double took_ms)
+{
+	pthread_mutex_lock(&queue->mutex);
+	fair_order_settle(queue->order, &job->entry, took_ms);
+	queue->running_ms = queue->running_turn_ms = 0;
+	pthread_mutex_unlock(&queue->mutex);
+}
+
+struct render_job *render_queue_remove(struct render_queue *queue, render_job_wanted *wanted, void *context)
+{
+	pthread_mutex_lock(&queue->mutex);
+	struct render_job *job = first(queue, wanted, context);
+	if (job) {
+		count_out(queue, job);
+		fair_order_drop(queue->order, &job->entry);
+	}
 	pthread_mutex_unlock(&queue->mutex);
 	return job;
 }
@@ -120,11 +199,9 @@ struct render_job *render_queue_pop_wanted(struct render_queue *queue, render_jo
 bool render_queue_has(struct render_queue *queue, render_job_wanted *wanted, void *context)
 {
 	pthread_mutex_lock(&queue->mutex);
-	struct render_job *job = queue->first;
-	while (job && !wanted(job, context))
-		job = job->next;
+	const bool has = first(queue, wanted, context);
 	pthread_mutex_unlock(&queue->mutex);
-	return job;
+	return has;
 }
 
 void render_queue_close(struct render_queue *queue)
@@ -149,4 +226,27 @@ double render_queue_pixels(struct render_queue *queue)
 	double pixels = queue->pixels;
 	pthread_mutex_unlock(&queue->mutex);
 	return pixels;
+}
+
+/* What a prediction leaves of the job that runs. */
+static double left_ms(const struct render_queue *queue, double predicted_ms)
+{
+	return predicted_ms > 0 ? fmax(predicted_ms - (clock_now_ms() - queue->running_since_ms), 0) : 0;
+}
+
+double render_queue_backlog_ms(struct render_queue *queue)
+{
+	pthread_mutex_lock(&queue->mutex);
+	const double backlog_ms = queue->waiting_ms + left_ms(queue, queue->running_ms);
+	pthread_mutex_unlock(&queue->mutex);
+	return backlog_ms;
+}
+
+double render_queue_ahead_ms(struct render_queue *queue, const char *client, double cost_ms)
+{
+	pthread_mutex_lock(&queue->mutex);
+	const double now_ms = clock_now_ms();
+	const double ahead_ms = fair_order_ahead_ms(queue->order, client, cost_ms, now_ms) + left_ms(queue, queue->running_turn_ms);
+	pthread_mutex_unlock(&queue->mutex);
+	return ahead_ms;
 }

@@ -16,12 +16,13 @@ enum { FAILURES_MAX = 3 };
 struct render_thread {
 	const struct config *config;
 	struct render_queue *queue;
+	struct cost_model *costs;
 	pthread_t thread;
 	struct kernel *kernel;
 	struct droplet_store *droplets;
 	struct renderer *renderer;
 	_Atomic int state; /* enum render_thread_state; kernel, droplets and renderer are set before it says READY */
-	_Atomic double busy_since_ms, typical_ms;
+	_Atomic double busy_since_ms;
 	int failures;     /* on end */
 	bool has_pending; /* a reference in the queue is on its way */
 };
@@ -34,9 +35,6 @@ struct running_job {
 	struct render_job *job;
 	double pause_ms; /* from when on others may pass */
 };
-
-/* A reference lets others pass after so long: about a picture's time each. */
-#define PASSING_MS 250.0
 
 static bool is_cancelled(void *context)
 {
@@ -61,7 +59,7 @@ static bool is_paused(void *context)
 
 static enum render_result ask_renderer(struct render_thread *thread, struct render_job *job)
 {
-	struct running_job running = {thread, job, clock_now_ms() + PASSING_MS};
+	struct running_job running = {thread, job, clock_now_ms() + RENDER_TURN_MS};
 	if (job->directions)
 		return renderer_sky_light(thread->renderer, job->scene, job->directions, is_cancelled, &running, &job->light);
 	return renderer_render_some(thread->renderer, job->scene, is_cancelled, is_paused, &running, &job->pending, &job->frame);
@@ -107,11 +105,14 @@ static void run_jobs(struct render_thread *thread)
 		const double start = clock_now_ms();
 		const bool was_pending = job->pending;
 		thread->busy_since_ms = start;
+		job->phase = RENDER_PHASE_RENDERING;
 		const bool ended = run_job(thread, job);
 		const double took = clock_now_ms() - start;
-		if (ended && job->outcome == RENDER_OUTCOME_OK && job->scene->model.name == MODEL_SLAB)
-			thread->typical_ms = thread->typical_ms > 0 ? 0.7 * thread->typical_ms + 0.3 * took : took;
 		thread->busy_since_ms = 0;
+		job->spent_ms += took;
+		render_queue_settle(thread->queue, job, took);
+		if (ended && job->outcome == RENDER_OUTCOME_OK)
+			cost_model_learn(thread->costs, job);
 		if (!ended || was_pending)
 			thread->has_pending = !ended;
 		if (ended)
@@ -162,6 +163,7 @@ static void *thread_main(void *context)
 		const struct renderer_info *info = renderer_info(thread->renderer);
 		log_info("renderer up in %.0f ms: %s, %s, OpenGL %s%s", clock_now_ms() - begin, info->vendor, info->renderer, info->version,
 			 info->software ? " (software rendering)" : "");
+		cost_model_start(thread->costs, info->software);
 		thread->state = RENDER_THREAD_READY;
 		run_jobs(thread);
 	} else {
@@ -171,7 +173,7 @@ static void *thread_main(void *context)
 	return NULL;
 }
 
-struct render_thread *render_thread_create(const struct config *config, struct render_queue *queue)
+struct render_thread *render_thread_create(const struct config *config, struct render_queue *queue, struct cost_model *costs)
 {
 	struct render_thread *thread = calloc(1, sizeof *thread);
 	if (!thread) {
@@ -180,6 +182,7 @@ struct render_thread *render_thread_create(const struct config *config, struct r
 	}
 	thread->config = config;
 	thread->queue = queue;
+	thread->costs = costs;
 	if (pthread_create(&thread->thread, NULL, thread_main, thread) != 0) {
 		log_error("render_thread_create: pthread_create failed");
 		free(thread);
@@ -227,9 +230,4 @@ double render_thread_busy_ms(const struct render_thread *thread)
 {
 	double since = thread->busy_since_ms;
 	return since > 0 ? clock_now_ms() - since : 0;
-}
-
-double render_thread_typical_ms(const struct render_thread *thread)
-{
-	return thread->typical_ms;
 }

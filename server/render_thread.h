@@ -6,14 +6,15 @@
 
 #include "renderer/droplet_store.h"
 #include "server/config.h"
+#include "server/cost_model.h"
 #include "server/render_queue.h"
 
 enum render_thread_state { RENDER_THREAD_STARTING, RENDER_THREAD_READY, RENDER_THREAD_FAILED };
 
 struct render_thread;
 
-/* Both arguments must outlive the thread. NULL (and a log line) on failure. */
-struct render_thread *render_thread_create(const struct config *config, struct render_queue *queue);
+/* costs: learns from every job. All arguments must outlive the thread. NULL (and a log line) on failure. */
+struct render_thread *render_thread_create(const struct config *config, struct render_queue *queue, struct cost_model *costs);
 
 /* Close the queue first: waits until every job in it is done. All droplet tables must have been released. Takes NULL. */
 void render_thread_destroy(struct render_thread *thread);
@@ -31,8 +32,5 @@ size_t render_thread_cache_bytes(const struct render_thread *thread, enum stage 
 
 /* Milliseconds since the running job began or last asked whether it is over, 0 when idle. Any thread. */
 double render_thread_busy_ms(const struct render_thread *thread);
-
-/* A typical job's milliseconds lately, 0 before the first. Any thread. */
-double render_thread_typical_ms(const struct render_thread *thread);
 
 #endif

@@ -1,5 +1,6 @@
 #include "server/request.h"
 
+#include "server/admission.h"
 #include "server/clock.h"
 #include "server/service.h"
 
@@ -20,13 +21,15 @@ static const char *origin_form(const char *target)
 	return path ? path : "/";
 }
 
-struct request *request_create(struct service *service, const char *target)
+struct request *request_create(struct service *service, struct connection *socket, const char *target)
 {
 	struct request *request = calloc(1, sizeof *request);
 	if (!request)
 		return NULL;
 	request->service = service;
-	request->started_ms = clock_now_ms();
+	request->socket = socket;
+	request->client = connection_client(socket);
+	request->started_ms = connection_begin(socket);
 	request->path = strdup(origin_form(target));
 	if (!request->path) {
 		free(request);
@@ -46,6 +49,7 @@ void request_destroy(struct request *request)
 		return;
 	if (request->work)
 		request->work_destroy(request->work);
+	admission_keep(request, 0);
 	problem_finish(&request->problem);
 	text_finish(&request->body);
 	free(request->path);
@@ -99,18 +103,22 @@ void request_suspend(struct request *request, request_handler *next)
 {
 	request->next = next;
 	request->service->suspended++;
+	connection_watch(request->socket);
 	MHD_suspend_connection(request->connection);
 }
 
 void request_resume(struct request *request)
 {
 	struct service *service = request->service;
+	connection_work(request->socket);
 	MHD_resume_connection(request->connection);
 	service->suspended--;
 }
 
 bool request_is_abandoned(const struct request *request)
 {
+	if (request->socket)
+		return connection_is_gone(request->socket);
 	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
 	struct pollfd poll_fd = {.fd = info ? info->connect_fd : -1, .events = POLLRDHUP};
 	return poll(&poll_fd, 1, 0) > 0 && (poll_fd.revents & (POLLRDHUP | POLLHUP | POLLERR));

@@ -7,6 +7,7 @@
 #ifndef STRATUS_SERVER_REQUEST_H
 #define STRATUS_SERVER_REQUEST_H
 
+#include "server/connections.h"
 #include "server/digest.h"
 #include "server/key_file.h"
 #include "server/metrics.h"
@@ -16,7 +17,7 @@
 #include <jansson.h>
 #include <microhttpd.h>
 
-enum { REQUEST_ID_SIZE = 129, REQUEST_BODY_MAX = 1 << 20, REQUEST_TIMEOUT_MS_MAX = 3600000 };
+enum { REQUEST_ID_SIZE = 129, REQUEST_TIMEOUT_MS_MAX = 3600000 };
 
 struct request;
 struct service;
@@ -34,12 +35,15 @@ struct route {
 struct request {
 	struct service *service;
 	struct MHD_Connection *connection; /* NULL until the headers are in */
+	struct connection *socket;         /* NULL: not watched */
+	const char *client;                /* key of whom it counts for */
 	char *path;                        /* as sent, without the query */
 	const char *query;                 /* as sent, behind the question mark; NULL: none */
 	char method[8];                    /* for the log, cut when longer */
 	bool is_post, is_put, is_head;
-	bool is_accepted; /* read to its end: counted in service->in_flight */
-	double started_ms;
+	bool closes;       /* its connection is not used again */
+	bool is_accepted;  /* read to its end: counted in service->in_flight */
+	double started_ms; /* its first byte came */
 	char id[REQUEST_ID_SIZE];
 	const struct route *route;
 	request_handler *next; /* what libmicrohttpd's next call runs */
@@ -51,6 +55,8 @@ struct request {
 	unsigned retry_after_s;  /* when the key may have more */
 	unsigned status;         /* answered; 0: not yet */
 	uint64_t bytes;          /* of the answer's body */
+	size_t memory_bytes;     /* that it was promised (admission.h) */
+	double late_ms;          /* of a request that is refused for it: so much later than it may be */
 	char scene[DIGEST_SIZE]; /* hash of the canonical scene that is asked for, for the log; empty: none */
 
 	/* What a route keeps with the request. */
@@ -58,8 +64,8 @@ struct request {
 	void (*work_destroy)(void *work);
 };
 
-/* target: of the request line. NULL when out of memory. */
-struct request *request_create(struct service *service, const char *target);
+/* target: of the request line; socket: its connection, or NULL. NULL when out of memory. */
+struct request *request_create(struct service *service, struct connection *socket, const char *target);
 void request_destroy(struct request *request);
 
 /* A request header, NULL when not sent. HTTP thread. */
@@ -77,7 +83,7 @@ void request_suspend(struct request *request, request_handler *next);
 /* Any thread, once. */
 void request_resume(struct request *request);
 
-/* Has the client closed its end? Any thread while suspended (the connection stays open as long). */
+/* Has the client closed its end, or its sending half? Any thread while suspended (the connection stays open as long). */
 bool request_is_abandoned(const struct request *request);
 
 #endif

@@ -1,6 +1,7 @@
 #include "server/response.h"
 
 #include "renderer/log.h"
+#include "server/admission.h"
 #include "server/clock.h"
 #include "server/cors.h"
 #include "server/entity_tag.h"
@@ -56,6 +57,9 @@ enum MHD_Result response_send(struct request *request, unsigned status, struct M
 	response_set(response, "Server-Timing", timing);
 	cors_allow(request, response);
 	response_set(response, "X-Request-Id", request->id);
+	if (request->closes || connection_is_surplus(request->socket))
+		response_set(response, "Connection", "close");
+	connection_work(request->socket);
 	enum MHD_Result result = MHD_queue_response(request->connection, status, response);
 	MHD_destroy_response(response);
 	if (result == MHD_YES)
@@ -68,7 +72,9 @@ static unsigned retry_after(const struct request *request)
 {
 	switch (request->problem.kind) {
 	case PROBLEM_QUEUE_FULL:
-		return service_retry_seconds(request->service);
+	case PROBLEM_PREDICTED_LATE:
+	case PROBLEM_MEMORY_LIMIT:
+		return admission_retry_seconds(request);
 	case PROBLEM_TRACINGS_FULL:
 		return service_tracing_retry_seconds(request->service);
 	case PROBLEM_COMPUTERS_FULL:
@@ -76,6 +82,7 @@ static unsigned retry_after(const struct request *request)
 	case PROBLEM_ALLOWANCE:
 		return request->retry_after_s;
 	case PROBLEM_UPLOADS_FULL:
+	case PROBLEM_CONNECTIONS:
 	case PROBLEM_STARTING:
 		return 2;
 	case PROBLEM_SHUTTING_DOWN:

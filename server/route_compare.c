@@ -8,6 +8,7 @@
 #include "renderer/image/regions.h"
 #include "renderer/log.h"
 #include "server/access.h"
+#include "server/admission.h"
 #include "server/call.h"
 #include "server/clock.h"
 #include "server/compare_query.h"
@@ -83,6 +84,7 @@ static void check_variants(struct compare_work *work, const json_t *root)
 		struct problem own = {0};
 		init_run(work, i, &work->query.variant[i].input.scene);
 		reference_limits_check(request->service->config, work->run[i].scene, &own);
+		admission_check_size(request->service->config, work->run[i].scene, "/output", &own);
 		scene_assets_find(request->service->assets, work->run[i].scene, &work->run[i].assets, &own);
 		compare_query_add(root, i, &own, &request->problem);
 		problem_finish(&own);
@@ -155,7 +157,7 @@ static enum MHD_Result finish(struct request *request)
 {
 	struct compare_work *work = request->work;
 	if (work->refused)
-		return call_refuse_render(request);
+		return call_refuse_render(request, work->ended ? work->ended : &work->run[work->order[0]].job);
 	if (work->ended->outcome != RENDER_OUTCOME_OK)
 		return call_send_render_failure(request, work->ended->outcome, "The comparison", "pictures of this size");
 	return send_answer(request);
@@ -220,6 +222,7 @@ static void compare(struct work *base)
 	const double start = clock_now_ms();
 	/* What was cut short for the deadline goes out, even if that passes now. */
 	work->ended->deadline_ms = has_partial(work) ? INFINITY : work->deadline_ms;
+	work->ended->phase = RENDER_PHASE_ENCODING;
 	work->ended->outcome = RENDER_OUTCOME_NO_MEMORY; /* unless something else turns up */
 	const bool ok = comparison_run(&work->query, frames, work->query.has_masks ? &work->run[MASK_RUN].job.frame : NULL, job_is_over,
 				       work->ended, &comparison);
@@ -232,6 +235,7 @@ static void compare(struct work *base)
 	if (work->ended->outcome == RENDER_OUTCOME_OK)
 		job_is_over(work->ended);
 	comparison_finish(&comparison);
+	admission_keep(work->request, work->answer.size);
 	hand_back(work);
 }
 
@@ -318,12 +322,21 @@ static bool start_run(struct compare_work *work)
 	run->job.abandoned = job_is_abandoned;
 	run->job.finished = on_rendered;
 	run->decode.run = decode;
+	admission_price(work->request, &run->job);
 	run->decoding_since_ms = clock_now_ms();
 	return scene_assets_take(service->maps, run->scene, &run->assets) ? push(work, run)
 									  : worker_pool_try(service->decoders, &run->decode);
 }
 
 /* --- the way through ------------------------------------------------------------------------------------------------------------ */
+
+static bool enter(struct compare_work *work)
+{
+	const struct scene *scenes[RUNS_MAX];
+	for (int i = 0; i < work->run_count; i++)
+		scenes[i] = work->run[work->order[i]].scene;
+	return admission_enter(work->request, scenes, work->run_count, NULL, work->deadline_ms);
+}
 
 enum MHD_Result route_compare(struct request *request)
 {
@@ -340,6 +353,8 @@ enum MHD_Result route_compare(struct request *request)
 	if (request->problem.kind == PROBLEM_NONE)
 		plan(work);
 	if (request->problem.kind != PROBLEM_NONE || service_refuses(request))
+		return response_send_problem(request);
+	if (!enter(work))
 		return response_send_problem(request);
 	const struct scene_output *output = &work->query.variant[0].input.scene.output;
 	enum MHD_Result result;

@@ -8,8 +8,10 @@
 
 #include "renderer/log.h"
 #include "server/access.h"
+#include "server/admission.h"
 #include "server/call.h"
 #include "server/clock.h"
+#include "server/cost_model.h"
 #include "server/json_document.h"
 #include "server/negotiation.h"
 #include "server/query.h"
@@ -106,6 +108,7 @@ static void read_scene(struct request *request, struct render_work *work)
 	bool acceptable = negotiation_choose(request_header(request, "Accept"), *format, format);
 	scene_rules_apply(input, &request->problem);
 	reference_limits_check(request->service->config, &input->scene, &request->problem);
+	admission_check_size(request->service->config, &input->scene, "/output", &request->problem);
 	scene_assets_find(request->service->assets, &input->scene, &work->assets, &request->problem);
 	if (!acceptable)
 		problem_set(&request->problem, PROBLEM_NOT_ACCEPTABLE, "The image would be %s, which the Accept header excludes.",
@@ -163,7 +166,7 @@ static enum MHD_Result finish(struct request *request)
 {
 	struct render_work *work = request->work;
 	if (work->refused)
-		return call_refuse_render(request);
+		return call_refuse_render(request, &work->job);
 	timings_set(&request->timings, TIMING_QUEUE, work->job.waited_ms);
 	if (work->job.outcome != RENDER_OUTCOME_OK)
 		return call_send_render_failure(request, work->job.outcome, "The image", "an image of this size and these layers");
@@ -197,9 +200,10 @@ static void encode(struct work *base)
 		.scene_json = work->canonical, .request_id = work->request->id, .software = "stratus " RENDERER_VERSION};
 	char error[256] = "";
 	double start = clock_now_ms();
+	work->job.phase = RENDER_PHASE_ENCODING;
 	/* What was cut short for the deadline goes out, even if that passes now. */
 	const double deadline_ms = work->job.frame.partial ? INFINITY : work->deadline_ms;
-	if (work->job.frame.partial && request_is_abandoned(work->request)) {
+	if (request_is_abandoned(work->request)) {
 		work->job.outcome = RENDER_OUTCOME_ABANDONED;
 	} else if (start >= deadline_ms) {
 		work->job.outcome = RENDER_OUTCOME_EXPIRED;
@@ -211,6 +215,9 @@ static void encode(struct work *base)
 		work->job.outcome = RENDER_OUTCOME_EXPIRED;
 	}
 	work->encode_ms = clock_now_ms() - start;
+	if (work->job.outcome == RENDER_OUTCOME_OK)
+		cost_model_learn_encoding(work->request->service->costs, &work->input.scene, work->encode_ms);
+	admission_keep(work->request, work->image.size);
 	free(work->job.frame.pixels);
 	work->job.frame.pixels = NULL;
 	call_end_render(work->request, &work->job);
@@ -276,6 +283,9 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	work->job.finished = on_rendered;
 	work->encode.run = encode;
 	work->decode.run = decode;
+	if (!admission_enter(request, &work->job.scene, 1, NULL, deadline_ms))
+		return response_send_problem(request);
+	admission_price(request, &work->job);
 	/* Suspended first: the render thread may be done before preparation_push returns. */
 	request_suspend(request, finish);
 	work->decoding_since_ms = clock_now_ms();

@@ -7,6 +7,7 @@
 
 #include "renderer/log.h"
 #include "renderer/optics/optics.h"
+#include "server/admission.h"
 #include "server/call.h"
 #include "server/clock.h"
 #include "server/response.h"
@@ -97,7 +98,7 @@ static enum MHD_Result finish(struct request *request)
 {
 	struct sky_work *work = request->work;
 	if (work->refused)
-		return call_refuse_render(request);
+		return call_refuse_render(request, &work->job);
 	timings_set(&request->timings, TIMING_QUEUE, work->job.waited_ms);
 	if (work->job.outcome != RENDER_OUTCOME_OK)
 		return call_send_render_failure(request, work->job.outcome, "The sky", "so many directions");
@@ -120,9 +121,8 @@ static void write_answer(struct work *base)
 {
 	struct sky_work *work = (struct sky_work *)((char *)base - offsetof(struct sky_work, write));
 	double start = clock_now_ms();
-	if (start >= work->job.deadline_ms) {
-		work->job.outcome = RENDER_OUTCOME_EXPIRED;
-	} else {
+	work->job.phase = RENDER_PHASE_ENCODING;
+	if (!render_job_is_over(&work->job)) {
 		work->answer = format_answer(work);
 		if (!work->answer) {
 			log_error("request %s: out of memory", work->request->id);
@@ -157,6 +157,9 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	work->job.abandoned = is_abandoned;
 	work->job.finished = on_computed;
 	work->write.run = write_answer;
+	if (!admission_enter(request, &work->job.scene, 1, &work->directions, deadline_ms))
+		return response_send_problem(request);
+	admission_price(request, &work->job);
 	/* Suspended first: the render thread may be done before preparation_push returns. */
 	request_suspend(request, finish);
 	if (!preparation_push(request->service->preparation, &work->job)) {

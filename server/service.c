@@ -56,7 +56,7 @@ static void *load_images(void *context)
 static bool start_rendering(struct service *service)
 {
 	pthread_t loader;
-	service->render_thread = render_thread_create(service->config, service->queue);
+	service->render_thread = render_thread_create(service->config, service->queue, service->costs);
 	if (!service->render_thread)
 		return false;
 	if (pthread_create(&loader, NULL, load_images, service) != 0) {
@@ -79,6 +79,29 @@ static bool open_assets(struct service *service)
 	return service->assets && service->maps && service->decoder;
 }
 
+static struct render_queue_limits queue_limits(const struct config *config)
+{
+	return (struct render_queue_limits){(size_t)config->queue_length, 1e6 * config->queue_mpixels};
+}
+
+/* What was begun is the render thread's to end. */
+static bool is_over(struct render_job *job, void *context)
+{
+	(void)context;
+	return !job->pending && render_job_is_over(job);
+}
+
+/* Renders that wait and that nobody waits for any more, or not in time, make room at once. */
+static void drop_over(void *context)
+{
+	struct service *service = context;
+	if (!service->ready)
+		return;
+	for (struct render_job *job; (job = render_queue_remove(service->queue, is_over, NULL));)
+		job->finished(job);
+	preparation_drop_over(service->preparation);
+}
+
 struct service *service_create(const struct config *config)
 {
 	struct service *service = calloc(1, sizeof *service);
@@ -90,12 +113,21 @@ struct service *service_create(const struct config *config)
 	service->config = config;
 	service->listening_socket = -1;
 	service->metrics = metrics_create();
-	service->queue = render_queue_create((size_t)config->queue_length);
+	const struct render_queue_limits limits = queue_limits(config);
+	service->queue = render_queue_create(&limits);
+	service->costs = cost_model_create();
+	const struct connections_params watched = {.total = (size_t)config->connections,
+						   .per_address = (size_t)config->connections_per_address,
+						   .read_ms = 1e3 * config->read_timeout_s,
+						   .tick = drop_over,
+						   .context = service};
+	service->connections = connections_create(&watched);
 	service->workers = worker_pool_create(workers, 2 * workers, 0);
 	service->computers = worker_pool_create(COMPUTER_COUNT, (size_t)config->queue_length, COMPUTER_NICE);
 	service->tracers = worker_pool_create(1, SERVICE_TRACINGS_MAX, TRACER_NICE);
 	service->decoders = worker_pool_create(1, (size_t)config->queue_length, DECODER_NICE);
-	const bool pools = service->workers && service->computers && service->tracers && service->decoders;
+	const bool pools =
+		service->connections && service->costs && service->workers && service->computers && service->tracers && service->decoders;
 	service->keys = api_keys_create(config->keys);
 	const bool guarded = service->keys && (!config->tls_cert || tls_load(config->tls_cert, config->tls_key));
 	if (pools && guarded && open_assets(service) && service->metrics && service->queue && http_start(service) &&
@@ -110,9 +142,9 @@ static bool finish_start(struct service *service)
 {
 	if (!service->pixel_version)
 		service->pixel_version = pixel_version(service);
+	const struct render_queue_limits limits = queue_limits(service->config);
 	if (!service->preparation)
-		service->preparation = preparation_create(render_thread_droplets(service->render_thread), service->queue,
-							  (size_t)service->config->queue_length);
+		service->preparation = preparation_create(render_thread_droplets(service->render_thread), service->queue, &limits);
 	return service->pixel_version && service->preparation;
 }
 
@@ -157,6 +189,7 @@ void service_destroy(struct service *service)
 	http_quiesce(service);
 	drain(service);
 	await_suspended(service);
+	connections_stop(service->connections);
 	http_stop(service);
 	preparation_destroy(service->preparation);
 	if (service->queue)
@@ -170,6 +203,8 @@ void service_destroy(struct service *service)
 	asset_maps_destroy(service->maps);
 	asset_store_destroy(service->assets);
 	render_queue_destroy(service->queue);
+	cost_model_destroy(service->costs);
+	connections_destroy(service->connections);
 	metrics_destroy(service->metrics);
 	api_keys_destroy(service->keys);
 	tls_unload();
@@ -215,14 +250,6 @@ static unsigned whole_seconds(double milliseconds)
 {
 	double seconds = milliseconds * 1e-3;
 	return seconds < 1 ? 1 : seconds > 60 ? 60 : (unsigned)seconds;
-}
-
-unsigned service_retry_seconds(const struct service *service)
-{
-	double milliseconds = (double)render_queue_depth(service->queue) * render_thread_typical_ms(service->render_thread);
-	if (service->ready)
-		milliseconds += (double)preparation_depth(service->preparation) * preparation_typical_ms(service->preparation);
-	return whole_seconds(milliseconds);
 }
 
 unsigned service_computing_retry_seconds(const struct service *service)

@@ -7,6 +7,8 @@
 #include "server/asset_maps.h"
 #include "server/config.h"
 #include "server/decoder.h"
+#include "server/connections.h"
+#include "server/cost_model.h"
 #include "server/metrics.h"
 #include "server/preparation.h"
 #include "server/render_queue.h"
@@ -30,6 +32,8 @@ struct MHD_Daemon;
 /* Read by the routes; what is not atomic does not change from the moment `ready` is true. */
 struct service {
 	const struct config *config;
+	struct connections *connections;
+	struct cost_model *costs;
 	struct metrics *metrics;
 	struct render_queue *queue;
 	struct render_thread *_Atomic render_thread;
@@ -50,6 +54,7 @@ struct service {
 	int listening_socket; /* taken from libmicrohttpd while stopping; else negative */
 
 	_Atomic size_t in_flight;    /* requests read to their end and not answered to theirs */
+	_Atomic size_t memory_bytes; /* promised to pictures in work (admission.h) */
 	_Atomic size_t suspended;    /* those of them that others work for */
 	_Atomic double tracing_ms;   /* what the last tracing took */
 	_Atomic double computing_ms; /* what the last call did that computers worked for */
@@ -77,9 +82,7 @@ enum service_state service_state(const struct service *service);
 size_t service_queue_depth(const struct service *service);
 double service_queue_pixels(const struct service *service);
 
-/* A guess at when the queue has room again, from 1. Any thread. */
-unsigned service_retry_seconds(const struct service *service);
-/* Likewise for photon tracings, and for calls that compute droplets and layers. */
+/* A guess at when there is room again for photon tracings, and for calls that compute droplets and layers, from 1. Any thread. */
 unsigned service_tracing_retry_seconds(const struct service *service);
 unsigned service_computing_retry_seconds(const struct service *service);
 

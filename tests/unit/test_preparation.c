@@ -39,8 +39,9 @@ static struct fixture *start(double tables, size_t limit)
 	assert_non_null(fixture);
 	fixture->store = droplet_store_create(&(struct droplet_store_params){
 		.kernel = kernel, .memory_bytes = (size_t)(tables * (double)sizeof(struct droplet_storage)), .threads = 2});
-	fixture->queue = render_queue_create(limit);
-	fixture->preparation = preparation_create(fixture->store, fixture->queue, limit);
+	const struct render_queue_limits limits = {limit, 1e9};
+	fixture->queue = render_queue_create(&limits);
+	fixture->preparation = preparation_create(fixture->store, fixture->queue, &limits);
 	assert_non_null(fixture->preparation);
 	for (int i = 0; i < JOBS; i++) {
 		struct waiter *waiter = &fixture->waiters[i];
@@ -70,6 +71,7 @@ static bool push(struct fixture *fixture, int i)
 static int render_next(struct fixture *fixture)
 {
 	struct render_job *job = render_queue_pop(fixture->queue);
+	render_queue_settle(fixture->queue, job, 1);
 	assert_non_null(job);
 	assert_non_null(job->droplets);
 	assert_true(job->droplets->optics->extinction_per_m[0] > 0);

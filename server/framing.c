@@ -1,0 +1,55 @@
+#include "server/framing.h"
+
+#include <stdbool.h>
+#include <string.h>
+#include <strings.h>
+
+struct framing {
+	int lengths, codings;
+	bool other_coding, bad_length, bad_name;
+};
+
+/* A name is a token (RFC 9110, 5.6.2): a blank in it, before the colon say, makes it another header for another reader. */
+static bool is_token(const char *name, size_t size)
+{
+	for (size_t i = 0; i < size; i++)
+		if (name[i] <= ' ' || name[i] == 0x7f || strchr("\"(),/:;<=>?@[\\]{}", name[i]))
+			return false;
+	return size > 0;
+}
+
+static bool is_digits(const char *value, size_t size)
+{
+	for (size_t i = 0; i < size; i++)
+		if (value[i] < '0' || value[i] > '9')
+			return false;
+	return size > 0;
+}
+
+static enum MHD_Result look(void *context, enum MHD_ValueKind kind, const char *name, size_t name_size, const char *value, size_t size)
+{
+	struct framing *framing = context;
+	(void)kind;
+	framing->bad_name |= !is_token(name, name_size);
+	if (strcasecmp(name, "Content-Length") == 0) {
+		framing->lengths++;
+		framing->bad_length |= !is_digits(value, size);
+	} else if (strcasecmp(name, "Transfer-Encoding") == 0) {
+		framing->codings++;
+		framing->other_coding |= !value || strcasecmp(value, "chunked") != 0;
+	}
+	return MHD_YES;
+}
+
+const char *framing_fault(struct MHD_Connection *connection)
+{
+	struct framing framing = {0};
+	MHD_get_connection_values_n(connection, MHD_HEADER_KIND, look, &framing);
+	if (framing.bad_name)
+		return "The name of a header must be a token, with no blank before the colon.";
+	if (framing.lengths > 1 || framing.codings > 1 || (framing.lengths && framing.codings))
+		return "A request has one Content-Length or one Transfer-Encoding, not more and not both.";
+	if (framing.bad_length)
+		return "Content-Length must be a whole number.";
+	return framing.other_coding ? "Transfer-Encoding may be chunked alone." : NULL;
+}

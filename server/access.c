@@ -58,6 +58,7 @@ bool access_admit(struct request *request, enum MHD_Result *result)
 		*result = response_send_new_problem(request, PROBLEM_BAD_KEY, "That is no key of this service.");
 		return false;
 	}
+	request->client = request->key; /* a key's time is shared by all who show it, from wherever */
 	const double wait_ms = api_keys_take(keys, request->key, KEY_LIMIT_REQUESTS, 1);
 	return wait_ms > 0 ? refuse_for_now(request, wait_ms, "requests", result) : true;
 }

@@ -252,6 +252,31 @@ static void test_process_is_replaced(void **state)
 	assert_int_not_equal(child_process(), second);
 }
 
+static void *give_up_soon(void *context)
+{
+	const struct timespec moment = {.tv_nsec = 300000000};
+	(void)context;
+	nanosleep(&moment, NULL);
+	decoder_give_up(decoder);
+	return NULL;
+}
+
+static void test_giving_up(void **state)
+{
+	char error[256];
+	pthread_t other;
+	(void)state;
+	assert_int_equal(examine_within(HONEST, LONG_MS, error), DECODER_OK);
+	const pid_t process = child_process();
+	const double begin = clock_now_ms();
+	assert_int_equal(pthread_create(&other, NULL, give_up_soon, NULL), 0);
+	assert_int_equal(examine_within(SLEEPS, LONG_MS, error), DECODER_LATE);
+	pthread_join(other, NULL);
+	assert_true(clock_now_ms() - begin < 10000);
+	assert_int_equal(kill(process, 0), -1);
+	assert_int_equal(examine_within(HONEST, LONG_MS, error), DECODER_LATE);
+}
+
 static int open_descriptors(void)
 {
 	int count = 0;
@@ -402,6 +427,7 @@ int main(int argc, char **argv)
 		cmocka_unit_test_setup_teardown(test_no_way_out, start, stop),
 		cmocka_unit_test_setup_teardown(test_deadline, start, stop),
 		cmocka_unit_test_setup_teardown(test_process_is_replaced, start, stop),
+		cmocka_unit_test_setup_teardown(test_giving_up, start, stop),
 		cmocka_unit_test_setup_teardown(test_nothing_is_left, start, stop),
 		cmocka_unit_test_setup_teardown(test_from_many_threads, start, stop),
 		cmocka_unit_test_teardown(test_finds_what_is_found_here, stop),

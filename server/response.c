@@ -48,6 +48,12 @@ static void format_timing(struct request *request, char timing[static SERVER_TIM
 	timings_format(&request->timings, timing);
 }
 
+static void keep_private(const struct request *request, struct MHD_Response *response)
+{
+	if (*request->key && MHD_del_response_header(response, "Cache-Control", CACHE_KEEP) == MHD_YES)
+		response_set(response, "Cache-Control", CACHE_KEEP_PRIVATE);
+}
+
 enum MHD_Result response_send(struct request *request, unsigned status, struct MHD_Response *response)
 {
 	if (!response)
@@ -56,6 +62,7 @@ enum MHD_Result response_send(struct request *request, unsigned status, struct M
 	format_timing(request, timing);
 	response_set(response, "Server-Timing", timing);
 	cors_allow(request, response);
+	keep_private(request, response);
 	response_set(response, "X-Request-Id", request->id);
 	if (request->closes || connection_is_surplus(request->socket))
 		response_set(response, "Connection", "close");

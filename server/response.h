@@ -6,6 +6,8 @@
 
 /* Cache-Control of what a scene or a query determines: kept, and asked for again by its entity tag after an hour. */
 #define CACHE_KEEP "public, max-age=3600"
+/* The same of an answer to who showed a key: "public" would let a cache in front give it to those who have none (RFC 9111, 3.5). */
+#define CACHE_KEEP_PRIVATE "private, max-age=3600"
 /* Of what may change under its address at any time: kept, but asked for again by its entity tag every time. */
 #define CACHE_ASK  "no-cache"
 #define CACHE_NONE "no-store"

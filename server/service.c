@@ -166,6 +166,8 @@ static void drain(struct service *service)
 	while (service->in_flight > 0 && clock_now_ms() < limit)
 		usleep(5000);
 	service->giving_up = true;
+	if (service->decoder)
+		decoder_give_up(service->decoder);
 }
 
 /* libmicrohttpd must not stop while a connection is suspended. Jobs are abandoned between two passes, so this is quick unless one hangs;

@@ -54,15 +54,20 @@ enum call_outcome call_reason_to_stop(const struct request *request, double dead
 	return request_is_abandoned(request) ? CALL_ABANDONED : CALL_OK;
 }
 
-void call_end_render(struct request *request, const struct render_job *job)
+void call_end_wait(struct request *request, enum render_outcome outcome)
 {
 	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
 						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
 						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
 						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
-	if (job->outcome != RENDER_OUTCOME_OK)
-		metrics_count_end(request->service->metrics, ends[job->outcome]);
+	if (outcome != RENDER_OUTCOME_OK)
+		metrics_count_end(request->service->metrics, ends[outcome]);
 	request_resume(request);
+}
+
+void call_end_render(struct request *request, const struct render_job *job)
+{
+	call_end_wait(request, job->outcome);
 }
 
 enum MHD_Result call_refuse_computing(struct request *request)

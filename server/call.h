@@ -41,6 +41,9 @@ enum call_outcome call_reason_to_stop(const struct request *request, double dead
 /* Does nobody wait for it any more? */
 bool call_is_abandoned(const struct request *request);
 
+/* The same of one of several requests that wait for one job. */
+void call_end_wait(struct request *request, enum render_outcome outcome);
+
 /* Counts a job of the render thread that brought nothing, and resumes its request. Counted here and not when the answer is sent, which
  * libmicrohttpd does not come to for a connection that it finds closed. */
 void call_end_render(struct request *request, const struct render_job *job);

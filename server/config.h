@@ -4,6 +4,9 @@
 
 #include "renderer/renderer.h"
 
+/* Of memory: a tebibyte. */
+#define CONFIG_BYTES_MAX (1LL << 40)
+
 struct config {
 	const char *listen;       /* HOST:PORT, [IPv6]:PORT; port 0: any free one */
 	const char *state_dir;    /* never NULL after config_parse; made when first needed */
@@ -26,6 +29,8 @@ struct config {
 	int reference_mpaths; /* 1..1048576; millions of light paths of one picture by the reference */
 	int log_level;        /* enum log_level */
 	int log_format;       /* enum log_format */
+
+	long long image_cache; /* bytes, 0..CONFIG_BYTES_MAX; 0: no image is kept */
 
 	char state_dir_buffer[4096]; /* holds the default of state_dir */
 };

@@ -16,6 +16,8 @@ static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/compa
 						     "/v1/sun",       "/v1/assets",  "/v1/assets/NAME", "/v1/presets", "/",
 						     "/openapi.yaml", "/healthz",    "/readyz",         "/metrics",    "other"};
 static const char *const rejection_names[REJECTION_COUNT] = {"full", "starting", "shutting_down"};
+static const char *const image_names[IMAGE_SOURCE_COUNT] = {
+	[IMAGE_FROM_CACHE] = "hit", [IMAGE_SHARED] = "shared", [IMAGE_MISSED] = "miss", [IMAGE_BYPASSED] = "bypass"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
 static const char *const source_names[DROPLET_SOURCE_COUNT] = {
 	[DROPLETS_FROM_MEMORY] = "memory", [DROPLETS_FROM_DISK] = "disk", [DROPLETS_COMPUTED] = "computed"};
@@ -44,6 +46,7 @@ struct metrics {
 	struct histogram stages[TIMING_COUNT];
 	struct histogram pictures; /* by pixels */
 	unsigned long reused[TIMING_COUNT];
+	unsigned long images[IMAGE_SOURCE_COUNT];
 	unsigned long rejected[REJECTION_COUNT];
 	unsigned long ended[END_COUNT];
 	unsigned long tracings_ended[END_COUNT];
@@ -115,6 +118,13 @@ void metrics_count_timings(struct metrics *metrics, const struct timings *timing
 		else if (timings->entry[i].measured)
 			observe(&metrics->stages[i], time_bounds, timings->entry[i].milliseconds * 1e-3);
 	}
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_image(struct metrics *metrics, enum metrics_image source)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->images[source]++;
 	pthread_mutex_unlock(&metrics->mutex);
 }
 
@@ -293,6 +303,22 @@ static void write_assets(struct text *text, const struct metrics_now *now)
 	text_printf(text, "stratus_asset_maps_bytes %llu\n", (unsigned long long)now->asset_map_bytes);
 }
 
+static void write_images(struct text *text, const struct metrics *metrics, const struct image_cache_counts *finished)
+{
+	write_family(text, "image_requests", "counter",
+		     "Requests for images, by what the finished images in memory or in work had for them.");
+	for (int i = 0; i < IMAGE_SOURCE_COUNT; i++)
+		text_printf(text, "stratus_image_requests_total{source=\"%s\"} %lu\n", image_names[i], metrics->images[i]);
+	write_family(text, "image_cache_bytes", "gauge", "Memory of finished images.");
+	text_printf(text, "stratus_image_cache_bytes %zu\n", finished->bytes);
+	write_family(text, "image_cache_limit_bytes", "gauge", "Memory that finished images may take.");
+	text_printf(text, "stratus_image_cache_limit_bytes %zu\n", finished->bound);
+	write_family(text, "image_cache_images", "gauge", "Finished images in memory.");
+	text_printf(text, "stratus_image_cache_images %zu\n", finished->images);
+	write_family(text, "image_cache_evictions", "counter", "Finished images dropped for want of room.");
+	text_printf(text, "stratus_image_cache_evictions_total %llu\n", (unsigned long long)finished->evicted);
+}
+
 /* The read-back remembers nothing. */
 static void write_cache(struct text *text, const struct metrics_now *now)
 {
@@ -384,6 +410,7 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_answers(&text, copy);
 	write_stages(&text, copy);
 	write_queue(&text, copy, now);
+	write_images(&text, copy, &now->finished);
 	write_tracings(&text, copy, now);
 	write_droplets(&text, &now->droplets);
 	write_assets(&text, now);

@@ -6,6 +6,7 @@
 #define STRATUS_SERVER_METRICS_H
 
 #include "renderer/droplet_store.h"
+#include "server/image_cache.h"
 #include "server/problem.h"
 #include "server/server_timing.h"
 
@@ -29,6 +30,8 @@ enum metrics_route {
 };
 
 enum metrics_rejection { REJECTED_FULL, REJECTED_STARTING, REJECTED_SHUTTING_DOWN, REJECTION_COUNT };
+/* Where the image of an answer came from. */
+enum metrics_image { IMAGE_FROM_CACHE, IMAGE_SHARED, IMAGE_MISSED, IMAGE_BYPASSED, IMAGE_SOURCE_COUNT };
 enum metrics_end { ENDED_EXPIRED, ENDED_ABANDONED, ENDED_FAILED, END_COUNT };
 
 struct metrics;
@@ -44,6 +47,8 @@ void metrics_count_problem(struct metrics *metrics, enum problem_kind kind);
 void metrics_count_picture(struct metrics *metrics, double pixels);
 /* The stages of an answered render. Stages taken from memory are counted apart: their zeros would hide what the work costs. */
 void metrics_count_timings(struct metrics *metrics, const struct timings *timings);
+/* A request for an image that was not answered without one. */
+void metrics_count_image(struct metrics *metrics, enum metrics_image source);
 void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection reason);
 /* Renders that were accepted and brought no picture. */
 void metrics_count_end(struct metrics *metrics, enum metrics_end end);
@@ -59,6 +64,7 @@ struct metrics_now {
 	double queue_pixels;
 	size_t tracings_waiting, tracings_limit;
 	struct droplet_store_counts droplets;
+	struct image_cache_counts finished;
 	size_t assets;
 	uint64_t asset_bytes, asset_map_bytes;        /* on disk; decoded, in memory */
 	size_t cache_bytes[STAGE_COUNT], cache_limit; /* on the GPU */

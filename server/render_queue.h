@@ -20,7 +20,7 @@ enum render_outcome {
 struct render_job {
 	const struct scene *scene;
 	const struct sky_directions *directions; /* NULL: a picture; else the light of the scene's clear sky there */
-	double deadline_ms;                      /* on the clock of clock.h */
+	_Atomic double deadline_ms;              /* on the clock of clock.h; moved by others who come to wait for it too */
 	double queued_ms;                        /* likewise, set by render_queue_push */
 
 	/* Asked at dequeue and between passes: does nobody wait any more? */

@@ -88,13 +88,16 @@ struct service *service_create(const struct config *config)
 	service->config = config;
 	service->listening_socket = -1;
 	service->metrics = metrics_create();
+	service->finished = image_cache_create((size_t)config->image_cache);
+	service->flights = service->finished ? flights_create(service->finished) : NULL;
 	service->queue = render_queue_create((size_t)config->queue_length);
 	service->workers = worker_pool_create(workers, 2 * workers, 0);
 	service->computers = worker_pool_create(COMPUTER_COUNT, (size_t)config->queue_length, COMPUTER_NICE);
 	service->tracers = worker_pool_create(1, SERVICE_TRACINGS_MAX, TRACER_NICE);
 	service->decoders = worker_pool_create(1, (size_t)config->queue_length, DECODER_NICE);
 	const bool pools = service->workers && service->computers && service->tracers && service->decoders;
-	if (pools && open_assets(service) && service->metrics && service->queue && http_start(service) && start_rendering(service))
+	if (pools && service->flights && open_assets(service) && service->metrics && service->queue && http_start(service) &&
+	    start_rendering(service))
 		return service;
 	service_destroy(service);
 	return NULL;
@@ -131,14 +134,20 @@ static void drain(struct service *service)
 	service->giving_up = true;
 }
 
+/* Renders may outlast those who waited for them, for as long as a pass takes. */
+static bool is_working(const struct service *service)
+{
+	return service->suspended > 0 || (service->flights && flights_open(service->flights) > 0);
+}
+
 /* libmicrohttpd must not stop while a connection is suspended. Jobs are abandoned between two passes, so this is quick unless one hangs;
  * then nothing is left that could be saved. */
 static void await_suspended(struct service *service)
 {
 	double limit = clock_now_ms() + 10000;
-	while (service->suspended > 0 && clock_now_ms() < limit)
+	while (is_working(service) && clock_now_ms() < limit)
 		usleep(1000);
-	if (service->suspended > 0) {
+	if (is_working(service)) {
 		log_error("shutdown: a render hangs, leaving it");
 		_exit(EXIT_FAILURE);
 	}
@@ -161,6 +170,8 @@ void service_destroy(struct service *service)
 	worker_pool_destroy(service->computers);
 	worker_pool_destroy(service->tracers);
 	worker_pool_destroy(service->decoders);
+	flights_destroy(service->flights);
+	image_cache_destroy(service->finished);
 	asset_maps_destroy(service->maps);
 	asset_store_destroy(service->assets);
 	render_queue_destroy(service->queue);

@@ -5,6 +5,7 @@
 #include "renderer/image/image.h"
 #include "server/asset_maps.h"
 #include "server/config.h"
+#include "server/flight.h"
 #include "server/metrics.h"
 #include "server/preparation.h"
 #include "server/render_queue.h"
@@ -36,6 +37,8 @@ struct service {
 	struct worker_pool *computers;   /* droplets and layers for their own calls, behind the pictures */
 	struct worker_pool *tracers;     /* one thread that traces photons, on all processors, behind everything else */
 	struct worker_pool *decoders;    /* one thread that reads uploaded pictures, one at a time since each takes memory */
+	struct image_cache *finished;    /* images, to be answered again */
+	struct flights *flights;         /* renders that several requests may wait for */
 	struct asset_store *assets;
 	struct asset_maps *maps;
 	struct MHD_Daemon *daemon;

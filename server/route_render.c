@@ -313,12 +313,11 @@ static void encode(struct work *base)
 	if (work->job.frame.partial)
 		flight_waive_deadlines(&work->flight); /* what was cut short for the deadline goes out, even if that passes now */
 	const bool wanted = flight_is_wanted(&work->flight);
-	if (wanted)
+	if (wanted && frame_take_pixels(&work->job.frame))
 		image = encode_frame(work);
 	work->is_kept = image && work->may_be_kept && image_cache_keep(work->service->finished, image);
 	work->encode_ms = clock_now_ms() - start;
-	free(work->job.frame.pixels);
-	work->job.frame.pixels = NULL;
+	frame_drop_pixels(&work->job.frame);
 	arrive(work, image ? RENDER_OUTCOME_OK : wanted ? RENDER_OUTCOME_FAILED : RENDER_OUTCOME_ABANDONED, image);
 }
 

@@ -33,7 +33,7 @@ enum { COST_PARTS = 4 };
 struct render_job {
 	const struct scene *scene;
 	const struct sky_directions *directions; /* NULL: a picture; else the light of the scene's clear sky there */
-	double deadline_ms;                      /* on the clock of clock.h */
+	_Atomic double deadline_ms;              /* on the clock of clock.h; moved by others who come to wait for it too */
 	double queued_ms;                        /* likewise, set by render_queue_push */
 	const char *client;                      /* key of whom it is for; must live as long. NULL: nobody's in particular */
 	int cost_ranks[COST_PARTS];              /* the cost model's own */

@@ -3,6 +3,7 @@
 #include "renderer/log.h"
 #include "server/clock.h"
 #include "server/kernel_file.h"
+#include "server/transfers.h"
 
 #include <limits.h>
 #include <pthread.h>
@@ -25,6 +26,7 @@ struct render_thread {
 	_Atomic double busy_since_ms;
 	int failures;     /* on end */
 	bool has_pending; /* a reference in the queue is on its way */
+	struct transfers transfers;
 };
 
 /* --- jobs -------------------------------------------------------------------------------------------------------------------------- */
@@ -36,9 +38,15 @@ struct running_job {
 	double pause_ms; /* from when on others may pass */
 };
 
+/* So often an idle thread looks for new work while it waits for a picture. */
+#define TRAVEL_MS 1.0
+
+static void end_arrived(struct render_thread *thread, double milliseconds);
+
 static bool is_cancelled(void *context)
 {
 	const struct running_job *running = context;
+	end_arrived(running->thread, 0);
 	running->thread->busy_since_ms = clock_now_ms();
 	return render_job_is_over(running->job);
 }
@@ -62,7 +70,7 @@ static enum render_result ask_renderer(struct render_thread *thread, struct rend
 	struct running_job running = {thread, job, clock_now_ms() + RENDER_TURN_MS};
 	if (job->directions)
 		return renderer_sky_light(thread->renderer, job->scene, job->directions, is_cancelled, &running, &job->light);
-	return renderer_render_some(thread->renderer, job->scene, is_cancelled, is_paused, &running, &job->pending, &job->frame);
+	return renderer_start(thread->renderer, job->scene, is_cancelled, is_paused, &running, &job->pending, &job->frame);
 }
 
 static enum render_outcome outcome_of(struct render_thread *thread, struct render_job *job, enum render_result result)
@@ -80,21 +88,67 @@ static enum render_outcome outcome_of(struct render_thread *thread, struct rende
 	return result == RENDER_OK ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
 }
 
-/* What was begun is given back to the renderer even when it is over. Returns whether the job has ended. */
-static bool run_job(struct render_thread *thread, struct render_job *job)
+/* What a turn took is its client's to pay. */
+static void settle(struct render_thread *thread, struct render_job *job, double took_ms)
+{
+	job->spent_ms += took_ms;
+	render_queue_settle(thread->queue, job, took_ms);
+}
+
+static void end_job(struct render_thread *thread, struct render_job *job, enum render_result result, double took_ms)
+{
+	settle(thread, job, took_ms);
+	job->outcome = outcome_of(thread, job, result);
+	if (job->outcome == RENDER_OUTCOME_OK)
+		cost_model_learn(thread->costs, job);
+	job->finished(job);
+}
+
+/* Ends the jobs whose pictures have arrived, waiting so long for the next. */
+static void end_arrived(struct render_thread *thread, double milliseconds)
+{
+	enum render_result result;
+	double took_ms;
+	for (struct render_job *job; (job = transfers_take(&thread->transfers, thread->renderer, milliseconds, &result, &took_ms));
+	     milliseconds = 0)
+		end_job(thread, job, result, took_ms);
+}
+
+/* What was begun is given back to the renderer even when it is over. */
+static enum render_result run_job(struct render_thread *thread, struct render_job *job)
 {
 	if (!job->pending && render_job_is_over(job))
-		return true;
-	const enum render_result result = ask_renderer(thread, job);
-	if (result == RENDER_UNFINISHED)
-		return false;
-	job->outcome = outcome_of(thread, job, result);
+		return RENDER_CANCELLED;
+	return ask_renderer(thread, job);
+}
+
+static bool is_any(struct render_job *job, void *context)
+{
+	(void)job, (void)context;
 	return true;
+}
+
+/* While pictures travel the renderer goes on with what there is to do, and looks for their arrival else. */
+static struct render_job *next_while_travelling(struct render_thread *thread)
+{
+	while (thread->transfers.count > 0) {
+		struct render_job *job = render_queue_pop_wanted(thread->queue, thread->has_pending ? may_pass : is_any, NULL);
+		if (job)
+			return job;
+		if (!(thread->busy_since_ms > 0))
+			thread->busy_since_ms = clock_now_ms();
+		end_arrived(thread, TRAVEL_MS);
+	}
+	thread->busy_since_ms = 0;
+	return NULL;
 }
 
 /* The next job; while a reference is on its way, which stands in the queue too, one that may pass it, or that itself. */
 static struct render_job *next_job(struct render_thread *thread)
 {
+	struct render_job *next = next_while_travelling(thread);
+	if (next)
+		return next;
 	struct render_job *job = thread->has_pending ? render_queue_pop_wanted(thread->queue, may_pass, NULL) : NULL;
 	return job ? job : render_queue_pop(thread->queue);
 }
@@ -106,19 +160,21 @@ static void run_jobs(struct render_thread *thread)
 		const bool was_pending = job->pending;
 		thread->busy_since_ms = start;
 		job->phase = RENDER_PHASE_RENDERING;
-		const bool ended = run_job(thread, job);
+		const enum render_result result = run_job(thread, job);
+		const bool unfinished = result == RENDER_UNFINISHED;
 		const double took = clock_now_ms() - start;
 		thread->busy_since_ms = 0;
-		job->spent_ms += took;
-		render_queue_settle(thread->queue, job, took);
-		if (ended && job->outcome == RENDER_OUTCOME_OK)
-			cost_model_learn(thread->costs, job);
-		if (!ended || was_pending)
-			thread->has_pending = !ended;
-		if (ended)
-			job->finished(job);
-		else
+		if (unfinished || was_pending)
+			thread->has_pending = unfinished;
+		if (unfinished) {
+			settle(thread, job, took);
 			render_queue_pass(thread->queue, job);
+		} else if (result == RENDER_OK && job->frame.transfer) {
+			transfers_add(&thread->transfers, job, start);
+		} else {
+			end_job(thread, job, result, took);
+		}
+		end_arrived(thread, 0);
 	}
 }
 

@@ -5,6 +5,7 @@
 #include "server/clock.h"
 #include "server/cors.h"
 #include "server/entity_tag.h"
+#include "server/image_cache.h"
 #include "server/service.h"
 
 #include <gnutls/gnutls.h>
@@ -21,6 +22,23 @@ struct MHD_Response *response_create(struct request *request, char *data, size_t
 	if (!response) {
 		log_error("response_create: out of memory");
 		free(data);
+	}
+	return response;
+}
+
+static void release_image(void *image)
+{
+	finished_image_release(image);
+}
+
+struct MHD_Response *response_create_shared(struct request *request, struct finished_image *image)
+{
+	request->bytes = image->size;
+	struct MHD_Response *response =
+		MHD_create_response_from_buffer_with_free_callback_cls(image->size, image->data, release_image, image);
+	if (!response) {
+		log_error("response_create_shared: out of memory");
+		finished_image_release(image);
 	}
 	return response;
 }

@@ -14,6 +14,9 @@
 
 /* The answer to a request. Takes over malloc'd data (also on failure). NULL when out of memory. */
 struct MHD_Response *response_create(struct request *request, char *data, size_t size);
+/* Likewise of an image that others hold too. Takes over one hold of it. */
+struct finished_image;
+struct MHD_Response *response_create_shared(struct request *request, struct finished_image *image);
 /* For a HEAD that is answered without computing, so that the length is unknown. */
 struct MHD_Response *response_create_unsized(void);
 void response_set(struct MHD_Response *response, const char *name, const char *value);

@@ -199,15 +199,19 @@ const struct gl_context_info *gl_context_info(const struct gl_context *context)
 
 static _Thread_local bool memory_error, lost;
 
+bool gl_was_reset(const char *what)
+{
+	if (glGetGraphicsResetStatus() == GL_NO_ERROR)
+		return false;
+	log_error("gl: context lost (%s)", what);
+	lost = true;
+	return true;
+}
+
 bool gl_failed(const char *what)
 {
-	bool failed = false;
+	bool failed = gl_was_reset(what);
 	memory_error = false;
-	if (glGetGraphicsResetStatus() != GL_NO_ERROR) {
-		log_error("gl: context lost (%s)", what);
-		lost = true;
-		failed = true;
-	}
 	/* A lost context may report errors for ever: a bounded number of them is read. */
 	for (int i = 0; i < 8; i++) {
 		const GLenum error = glGetError();

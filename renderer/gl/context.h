@@ -32,7 +32,10 @@ const struct gl_context_info *gl_context_info(const struct gl_context *context);
 /* True when OpenGL has reported an error since the last call (logged with `what`), or the context was lost. Owner thread. */
 bool gl_failed(const char *what);
 
-/* True once gl_failed has seen the context lost: nothing rendered in it will come out any more. Owner thread. */
+/* True when the context was lost (logged with `what`). Leaves errors where they are. Owner thread. */
+bool gl_was_reset(const char *what);
+
+/* True once one of these has seen the context lost: nothing rendered in it will come out any more. Owner thread. */
 bool gl_lost(void);
 
 /* True when the error last seen by gl_failed was GL_OUT_OF_MEMORY. Owner thread. */

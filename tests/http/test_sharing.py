@@ -295,17 +295,20 @@ def test_pictures_are_encoded_while_others_are_rendered(start_daemon):
     assert wall < spent, f"{wall:.0f} ms, of which {spent:.0f} ms were spent in stages"
 
 
-def test_probes_do_not_wait_for_a_long_render(start_daemon):
+def test_what_needs_no_renderer_does_not_wait_for_it(start_daemon):
     """On connections of their own, while a reference of minutes is rendered: from the connection to the last byte."""
     daemon = start_daemon()
+    known = "/v1/render?output.width=64&output.height=48"
+    assert daemon.get(known).status == 200
     long = {"model": {"name": "reference", "samples": 4096}, "output": {"width": 320, "height": 240}}
     client = send(daemon, long, X_Timeout_Ms="120000")
     assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") >= 2)
     time.sleep(1)
     took = []
-    for target in ["/healthz", "/readyz", "/metrics", "/v1/presets"] * 25:
+    for target in ["/healthz", "/readyz", "/metrics", known, known + "&clouds.seed=3"] * 20:
+        tags = {"If_None_Match": "*"} if "seed" in target else {}
         begin = time.monotonic()
-        assert daemon.get(target).status == 200
+        assert daemon.get(target, **tags).status == (304 if tags else 200)
         took.append(1000 * (time.monotonic() - begin))
     assert daemon.metric("stratus_requests_in_flight") >= 2, "the render ended too soon to show anything"
     client.close()

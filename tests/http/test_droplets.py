@@ -262,8 +262,8 @@ def test_deadline_while_preparing(daemon):
         running = [pool.submit(daemon.render, scene(13 + i / 16)) for i in range(6)]
         assert wait_for(lambda: daemon.metric("stratus_queue_depth") >= 3 or all(r.done() for r in running))
         late = daemon.render(scene(14), X_Timeout_Ms="1")
-        assert late.status == 504
-        assert late.json["type"] == "urn:stratus:problem:deadline-passed"
+        # Late, or foreseen to be.
+        assert (late.status, late.json["type"]) in ((504, "urn:stratus:problem:deadline-passed"), (503, "urn:stratus:problem:predicted-late"))
         assert {r.result().status for r in running} == {200}
     one = (computed(daemon) - before) / 6
     assert one == int(one)  # nothing was computed for the late one

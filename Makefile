@@ -6,6 +6,7 @@
 # make gallery   draws the pictures of docs/gallery
 # make fuzz     throws bytes at every reader of what strangers send, FUZZ_SECONDS (600) each; FUZZ="name name" takes these alone
 # make load     offers a daemon half of what it can do up to four times as much; three minutes
+# make golden    writes what the golden render is now into renderer/golden_values.h: after a change of what pictures look like
 # make install   puts programs, manual and systemd unit below PREFIX (/usr/local), all below DESTDIR; make uninstall takes them away
 # make image     builds the container image and renders a picture with it
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
@@ -57,7 +58,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel man install uninstall image run test fuzz replays load demo gallery validate judge unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall image run test fuzz replays load demo gallery validate judge golden unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -248,6 +249,10 @@ judge: packages
 	@scripts/packages.sh $(GALLERY_PACKAGES) python3
 	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
 	@scripts/judge.sh $(B)
+
+golden: packages
+	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
+	$(B)/render-bench -g renderer/golden_values.h
 
 unit: $(UNIT)
 

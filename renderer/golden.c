@@ -5,7 +5,7 @@
 #include <math.h>
 
 const struct golden_picture golden_expected = {{
-#include "renderer/golden_values.h"
+#include "renderer/golden_values.inc"
 }};
 
 /* Of full scale. Pixels of one picture differ by about 0.2 % between devices; a block of a cloud that another seed would make by 10 %. */
@@ -84,7 +84,6 @@ bool golden_compare(const struct golden_picture *picture, const struct golden_pi
 
 void golden_print(const struct golden_picture *picture, FILE *file)
 {
-	fprintf(file, "/* Made by `make golden`: what the golden render is (golden.h). Included by golden.c. */\n/* clang-format off */\n");
 	for (int y = 0; y < GOLDEN_ROWS; y++) {
 		fprintf(file, "{\n");
 		for (int x = 0; x < GOLDEN_COLUMNS; x++)
@@ -92,5 +91,4 @@ void golden_print(const struct golden_picture *picture, FILE *file)
 				(double)picture->mean[y][x][2]);
 		fprintf(file, "},\n");
 	}
-	fprintf(file, "/* clang-format on */\n");
 }

@@ -17,7 +17,7 @@ struct golden_picture {
 	float mean[GOLDEN_ROWS][GOLDEN_COLUMNS][3];
 };
 
-/* What the built-in shaders make of it (renderer/golden_values.h, by `make golden`). */
+/* What the built-in shaders make of it (renderer/golden_values.inc, by `make golden`). */
 extern const struct golden_picture golden_expected;
 
 enum golden_result { GOLDEN_PASSED, GOLDEN_FAILED, GOLDEN_CANCELLED };
@@ -28,7 +28,7 @@ enum golden_result golden_render(struct renderer *renderer, renderer_cancelled *
 /* Is it what is expected? else a log line says how far it is from that. */
 bool golden_compare(const struct golden_picture *picture, const struct golden_picture *expected);
 
-/* Writes it as renderer/golden_values.h. */
+/* Writes it as renderer/golden_values.inc. */
 void golden_print(const struct golden_picture *picture, FILE *file);
 
 #endif

@@ -11,7 +11,9 @@
 bool call_tag(const struct service *service, const char *call, char *question, char tag[static ENTITY_TAG_SIZE])
 {
 	struct text tagged = {0};
-	text_printf(&tagged, "%s|%s|%s", call, question ? question : "", service->pixel_version);
+	const struct renderer_info *device = render_thread_info(service->render_thread);
+	text_printf(&tagged, "%s|%s|%s|%s|%s|%s|%d", call, question ? question : "", service->pixel_version, device->vendor,
+		    device->renderer, device->version, (int)device->pass_kind);
 	const bool good = question && !tagged.failed;
 	if (good)
 		entity_tag_of(tagged.data, tagged.length, tag);
@@ -62,7 +64,8 @@ void call_end_render(struct request *request, const struct render_job *job)
 	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
 						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
 						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
-						[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
+						[RENDER_OUTCOME_FAILED] = ENDED_FAILED,
+						[RENDER_OUTCOME_UNAVAILABLE] = ENDED_FAILED};
 	if (job->outcome != RENDER_OUTCOME_OK)
 		metrics_count_end(request->service->metrics, ends[job->outcome], job->spent_ms);
 	else if (job->predicted_ms > 0)
@@ -111,6 +114,9 @@ enum MHD_Result call_send_render_failure(struct request *request, enum render_ou
 		return call_send_failure(request, CALL_ABANDONED, what);
 	case RENDER_OUTCOME_NO_MEMORY:
 		return response_send_new_problem(request, PROBLEM_NO_MEMORY, "The device has no memory for %s now.", size);
+	case RENDER_OUTCOME_UNAVAILABLE:
+		return response_send_new_problem(request, PROBLEM_UNAVAILABLE, "%s could not be made: the device is gone, or another one.",
+						 what);
 	case RENDER_OUTCOME_FAILED:
 	case RENDER_OUTCOME_OK:
 		break;

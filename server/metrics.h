@@ -11,6 +11,7 @@
 #include "server/connections.h"
 #include "server/problem.h"
 #include "server/render_queue.h"
+#include "server/renderer_care.h"
 #include "server/server_timing.h"
 
 #include <time.h>
@@ -42,6 +43,7 @@ enum metrics_rejection {
 	REJECTED_CONNECTIONS,
 	REJECTED_STARTING,
 	REJECTED_SHUTTING_DOWN,
+	REJECTED_UNAVAILABLE,
 	REJECTION_COUNT
 };
 enum metrics_end { ENDED_EXPIRED, ENDED_ABANDONED, ENDED_FAILED, END_COUNT };
@@ -76,6 +78,7 @@ struct metrics_now {
 	size_t queue_depth, queue_limit, requests_in_flight;
 	double queue_pixels, queue_pixels_limit, backlog_ms;
 	struct connections_counts connections;
+	struct care_counts care;
 	size_t connections_limit, memory_bytes, memory_limit;
 	size_t tracings_waiting, tracings_limit;
 	struct droplet_store_counts droplets;

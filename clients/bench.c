@@ -17,7 +17,19 @@ struct bench_options {
 	struct load_settings load;
 };
 
-enum { PRESET = 'p', SET = 's', RATE = 'r', RANDOM = 'R', CONNECTIONS = 'c', DURATION = 'd', WARM_UP = 'w', MIX = 'm', GET = 'g', JSON = 'j', SEED = 'x' };
+enum {
+	PRESET = 'p',
+	SET = 's',
+	RATE = 'r',
+	RANDOM = 'R',
+	CONNECTIONS = 'c',
+	DURATION = 'd',
+	WARM_UP = 'w',
+	MIX = 'm',
+	GET = 'g',
+	JSON = 'j',
+	SEED = 'x'
+};
 
 /* A number of an option within its bounds. false after a message. */
 static bool read_number(const char *option, const char *text, double low, double high, double *number)
@@ -187,8 +199,10 @@ const struct command command_bench = {
 	.name = "bench",
 	.arguments = "[SCENE.json|-]",
 	.summary = "put a load on the daemon and measure its answers",
-	.help = "With --rate requests go out at fixed times, whatever the answers, and latencies count from those times: a daemon that stands\n"
-		"still is charged with all who would have come meanwhile. Without it a number of clients each ask when they were answered.\n\n"
+	.help = "With --rate requests go out at fixed times, whatever the answers, and latencies count from those times: a daemon that "
+		"stands\n"
+		"still is charged with all who would have come meanwhile. Without it a number of clients each ask when they were "
+		"answered.\n\n"
 		"  --rate N           requests per second; without it a closed load\n"
 		"  --random           arrivals at random times (a Poisson process) instead of even ones\n"
 		"  --connections N    clients of a closed load (4); most connections of an open one (1024)\n"

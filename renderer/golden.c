@@ -71,10 +71,14 @@ bool golden_compare(const struct golden_picture *picture, const struct golden_pi
 	const float *is = &picture->mean[0][0][0], *should = &expected->mean[0][0][0];
 	const int count = GOLDEN_ROWS * GOLDEN_COLUMNS * 3;
 	int wrong = 0, worst = 0;
+	double most = 0;
 	for (int i = 0; i < count; i++) {
-		wrong += !(fabsf(is[i] - should[i]) <= tolerance * 255);
-		if (fabsf(is[i] - should[i]) > fabsf(is[worst] - should[worst]))
-			worst = i;
+		const double off = fabs((double)is[i] - (double)should[i]);
+		wrong += !(off <= tolerance * 255); /* what is no number is wrong */
+		if (off <= most || isnan(most))
+			continue;
+		most = off;
+		worst = i;
 	}
 	if (wrong > 0)
 		log_error("golden render: %d of %d means are off, one is %.1f and should be %.1f", wrong, count, (double)is[worst],

@@ -55,8 +55,9 @@ struct frame {
 	int channels;         /* 3: RGB; single-valued layers (optical_thickness, distance) repeat their value */
 	int layer_count;
 	enum layer layer[LAYER_COUNT];
-	void *pixels; /* malloc'd */
+	void *pixels; /* malloc'd; NULL while they are elsewhere (renderer_start) */
 	size_t bytes;
+	struct transfer *transfer; /* NULL: pixels are here */
 
 	int samples;  /* light paths behind every pixel, at least; 0: another model than the reference */
 	bool partial; /* fewer than were asked for, because the request was cancelled */
@@ -73,9 +74,14 @@ struct frame {
 };
 
 struct renderer;
+struct transfer; /* pixels between the renderer and a frame */
+
+/* So many pictures may be on their way at a time; others are waited for. */
+enum { RENDERER_TRANSFERS_MAX = 3 };
 
 /* Brings up EGL and OpenGL and compiles every shader. NULL (the log names what was tried) on failure. */
 struct renderer *renderer_create(const struct renderer_params *params);
+/* Waits for frames whose pixels are still the renderer's. Takes NULL. */
 void renderer_destroy(struct renderer *renderer);
 
 const struct renderer_info *renderer_info(const struct renderer *renderer);
@@ -116,6 +122,19 @@ enum renderer_loss renderer_look(void);
 /* Memory of the device that nobody uses, bytes; negative where the driver does not say. Of the calling thread's renderer. */
 double renderer_free_memory(void);
 
+/* As renderer_render_some, without waiting for the GPU at the end: on RENDER_OK the picture may still be on its way, frame->transfer, while
+ * the next one is begun. The frame's timing, but for the optics, is that of its arrival. */
+enum render_result renderer_start(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled,
+				  renderer_cancelled *paused, void *context, struct render_pending **pending, struct frame *frame);
+
+/* Has a picture arrived? RENDER_UNFINISHED: not within so many milliseconds. With RENDER_FAILED the frame is zeroed. May be called from
+ * `cancelled` of another picture. */
+enum render_result renderer_arrive(struct renderer *renderer, struct frame *frame, double milliseconds);
+
+/* The pixels of a picture that has arrived, into frame->pixels; nothing where they are already. Any thread; to be done soon, since few
+ * pictures can be between. false when out of memory. */
+bool frame_take_pixels(struct frame *frame);
+
 /* Directions to look at the sky in: each zenith angle with each azimuth. */
 struct sky_directions {
 	int view_count, azimuth_count; /* from 1 */
@@ -135,7 +154,10 @@ struct sky_light {
 enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
 				      renderer_cancelled *cancelled, void *context, struct sky_light *light);
 
-/* Frees the pixels. Takes a zeroed frame. */
+/* Frees the pixels, or gives them back, and leaves the rest. Any thread. */
+void frame_drop_pixels(struct frame *frame);
+
+/* Likewise, and zeroes the frame. Takes a zeroed one. */
 void frame_finish(struct frame *frame);
 
 #endif

@@ -72,6 +72,12 @@ bool access_admit_pixels(struct request *request, double pixels, enum MHD_Result
 	return true;
 }
 
+void access_return_pixels(struct request *request)
+{
+	api_keys_give_back(request->service->keys, request->key, KEY_LIMIT_MEGAPIXELS, request->admitted_pixels * 1e-6);
+	request->admitted_pixels = 0;
+}
+
 void access_end(struct request *request, unsigned status)
 {
 	struct api_keys *keys = request->service->keys;

@@ -15,6 +15,9 @@ bool access_admit(struct request *request, enum MHD_Result *result);
 /* It would be rendered, this many pixels, layers counted apart. false likewise, with 429. */
 bool access_admit_pixels(struct request *request, double pixels, enum MHD_Result *result);
 
+/* Another request's render, or an image that was finished, will do: its pixels cost this key nothing. */
+void access_return_pixels(struct request *request);
+
 /* The request has ended with this status: counts it, and gives back pixels that were not rendered since the service was too busy. */
 void access_end(struct request *request, unsigned status);
 

@@ -58,21 +58,34 @@ enum call_outcome call_reason_to_stop(const struct request *request, double dead
 	return request_is_abandoned(request) ? CALL_ABANDONED : CALL_OK;
 }
 
+static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
+					[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
+					[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
+					[RENDER_OUTCOME_FAILED] = ENDED_FAILED,
+					[RENDER_OUTCOME_UNAVAILABLE] = ENDED_FAILED};
+
+void call_end_wait(struct request *request, enum render_outcome outcome)
+{
+	if (outcome != RENDER_OUTCOME_OK)
+		metrics_count_end(request->service->metrics, ends[outcome]);
+	request_resume(request);
+}
+
+void call_count_render(struct service *service, const struct render_job *job)
+{
+	log_debug("%.1f ms of the renderer were predicted, it took %.1f", job->predicted_ms, job->spent_ms);
+	if (job->outcome != RENDER_OUTCOME_OK)
+		metrics_count_waste(service->metrics, ends[job->outcome], job->spent_ms);
+	else if (job->predicted_ms > 0)
+		metrics_count_prediction(service->metrics, job->spent_ms / job->predicted_ms);
+	if (job->outcome == RENDER_OUTCOME_ABANDONED)
+		metrics_count_cancellation(service->metrics, job->phase);
+}
+
 void call_end_render(struct request *request, const struct render_job *job)
 {
-	log_debug("request %s: %.1f ms of the renderer were predicted, it took %.1f", request->id, job->predicted_ms, job->spent_ms);
-	static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
-						[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
-						[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
-						[RENDER_OUTCOME_FAILED] = ENDED_FAILED,
-						[RENDER_OUTCOME_UNAVAILABLE] = ENDED_FAILED};
-	if (job->outcome != RENDER_OUTCOME_OK)
-		metrics_count_end(request->service->metrics, ends[job->outcome], job->spent_ms);
-	else if (job->predicted_ms > 0)
-		metrics_count_prediction(request->service->metrics, job->spent_ms / job->predicted_ms);
-	if (job->outcome == RENDER_OUTCOME_ABANDONED)
-		metrics_count_cancellation(request->service->metrics, job->phase);
-	request_resume(request);
+	call_count_render(request->service, job);
+	call_end_wait(request, job->outcome);
 }
 
 enum MHD_Result call_refuse_computing(struct request *request)

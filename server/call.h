@@ -41,6 +41,10 @@ enum call_outcome call_reason_to_stop(const struct request *request, double dead
 /* Does nobody wait for it any more? */
 bool call_is_abandoned(const struct request *request);
 
+/* Counts the wait of one of several requests for one job, and resumes it; the job itself is counted once, by call_count_render. */
+void call_end_wait(struct request *request, enum render_outcome outcome);
+void call_count_render(struct service *service, const struct render_job *job);
+
 /* Counts a job of the render thread that brought nothing, and resumes its request. Counted here and not when the answer is sent, which
  * libmicrohttpd does not come to for a connection that it finds closed. */
 void call_end_render(struct request *request, const struct render_job *job);

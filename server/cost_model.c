@@ -4,6 +4,7 @@
 #include "server/clock.h"
 #include "server/line_fit.h"
 
+#include <assert.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdint.h>
@@ -16,10 +17,11 @@ enum sight { SIGHT_CLEAR, SIGHT_BELOW, SIGHT_ABOVE, SIGHT_COUNT };
 enum form { FORM_PNG, FORM_COLOR, FORM_LAYERS, FORM_COUNT };
 
 /* What frames share. */
-enum part { PART_SKY, PART_FIELD, PART_RADIOSITY, PART_COUNT };
+enum part { PART_OPTICS, PART_SKY, PART_FIELD, PART_RADIOSITY, PART_COUNT };
+static_assert((int)PART_COUNT == (int)COST_PARTS, "jobs have a place for each part");
 
-/* So many different ones of each part are taken to be in the renderer's memory. */
-enum { KNOWN_COUNT = 32 };
+/* So many different ones of each part are remembered, and so many at first taken to be in the renderer's memory. */
+enum { KNOWN_COUNT = 32, REACH_START = 4 };
 
 /* Before anything is measured, in ms for each megapixel; rather too little than too much, so that a start refuses nobody: Mesa's llvmpipe
  * on two processors, and a small GPU. Parts and droplets likewise, in ms. */
@@ -35,9 +37,10 @@ enum { KNOWN_COUNT = 32 };
 /* Millions: of pixels, of light paths. */
 #define MEGA 1e-6
 
+/* What was asked for of late, the last first, and how far back the renderer's memory seems to reach. */
 struct memory {
 	uint64_t key[KNOWN_COUNT];
-	int next;
+	int reach;
 };
 
 struct cost_model {
@@ -45,7 +48,7 @@ struct cost_model {
 	double start_ms; /* for each megapixel */
 	double log_pace;
 	struct line_fit views[MODEL_COUNT][SIGHT_COUNT][FORM_COUNT], models[MODEL_COUNT];
-	struct line_fit light, prepare, parts[PART_COUNT];
+	struct line_fit light, prepare, parts[PART_COUNT][SIGHT_COUNT];
 	struct line_fit png[PNG_COMPRESSION_COUNT], exr[EXR_COMPRESSION_COUNT];
 	struct memory known[PART_COUNT];
 };
@@ -59,6 +62,8 @@ struct cost_model *cost_model_create(void)
 	}
 	pthread_mutex_init(&model->mutex, NULL);
 	model->start_ms = START_GPU_MS;
+	for (enum part part = 0; part < PART_COUNT; part++)
+		model->known[part].reach = REACH_START;
 	return model;
 }
 
@@ -112,7 +117,7 @@ static double view_size(const struct scene *scene)
 
 static double part_size(const struct scene *scene, enum part part)
 {
-	return part == PART_SKY ? 1 : MEGA * scene->clouds.resolution * scene->clouds.resolution;
+	return part == PART_SKY || part == PART_OPTICS ? 1 : MEGA * scene->clouds.resolution * scene->clouds.resolution;
 }
 
 static double light_size(const struct sky_directions *directions)
@@ -167,41 +172,69 @@ static uint64_t radiosity_key(const struct scene *scene)
 	return mix(key, numbers, sizeof numbers);
 }
 
+static uint64_t optics_key(const struct scene *scene)
+{
+	const double numbers[] = {scene->sun.elevation_deg, scene->model.shading, scene->model.optics};
+	return mix(mix(3, &scene->dsd, sizeof scene->dsd), numbers, sizeof numbers);
+}
+
+/* Seen from above the field needs something of its own, and so does the sky where there are no clouds. */
+static enum sight part_sight(const struct scene *scene, enum part part)
+{
+	const enum sight sight = sight_of(scene);
+	return part == PART_FIELD || (part == PART_SKY && sight == SIGHT_CLEAR) ? sight : SIGHT_BELOW;
+}
+
 static uint64_t part_key(const struct scene *scene, enum part part)
 {
-	return part == PART_SKY ? sky_key(scene) : part == PART_FIELD ? field_key(scene) : radiosity_key(scene);
+	static uint64_t (*const keys[PART_COUNT])(const struct scene *) = {
+		[PART_OPTICS] = optics_key, [PART_SKY] = sky_key, [PART_FIELD] = field_key, [PART_RADIOSITY] = radiosity_key};
+	const enum sight sight = part_sight(scene, part);
+	return mix(keys[part](scene), &sight, sizeof sight);
 }
 
 static bool has_part(const struct scene *scene, enum part part)
 {
-	return part == PART_SKY || (scene_has_clouds(scene) && (part == PART_FIELD || scene->radiosity.enabled));
+	return part == PART_SKY || (scene_has_clouds(scene) && (part != PART_RADIOSITY || scene->radiosity.enabled));
+}
+
+/* How many others were asked for since; KNOWN_COUNT: too many. */
+static int rank_of(const struct memory *memory, uint64_t key)
+{
+	int rank = 0;
+	while (rank < KNOWN_COUNT && memory->key[rank] != key)
+		rank++;
+	return rank;
 }
 
 static bool is_known(const struct memory *memory, uint64_t key)
 {
-	for (int i = 0; i < KNOWN_COUNT; i++)
-		if (memory->key[i] == key)
-			return true;
-	return false;
+	return rank_of(memory, key) < memory->reach;
 }
 
-static void expect_parts(struct cost_model *model, const struct scene *scene)
+void cost_model_expect(struct cost_model *model, const struct scene *scene, int ranks[static COST_PARTS])
 {
+	pthread_mutex_lock(&model->mutex);
 	for (enum part part = 0; part < PART_COUNT; part++) {
 		struct memory *memory = &model->known[part];
 		const uint64_t key = part_key(scene, part);
-		if (!has_part(scene, part) || is_known(memory, key))
+		const int rank = rank_of(memory, key), last = rank < KNOWN_COUNT ? rank : KNOWN_COUNT - 1;
+		ranks[part] = rank + 1;
+		if (!has_part(scene, part))
 			continue;
-		memory->key[memory->next] = key;
-		memory->next = (memory->next + 1) % KNOWN_COUNT;
+		memmove(memory->key + 1, memory->key, (size_t)last * sizeof *memory->key);
+		memory->key[0] = key;
 	}
+	pthread_mutex_unlock(&model->mutex);
 }
 
-void cost_model_expect(struct cost_model *model, const struct scene *scene)
+/* What was there shows how far it reaches; what was not, that it reaches less far, by how much depends on sizes. */
+static void learn_reach(struct memory *memory, int rank, bool reused)
 {
-	pthread_mutex_lock(&model->mutex);
-	expect_parts(model, scene);
-	pthread_mutex_unlock(&model->mutex);
+	if (reused && rank < KNOWN_COUNT && rank >= memory->reach)
+		memory->reach = rank + 1;
+	else if (!reused && rank < memory->reach)
+		memory->reach = memory->reach > 1 ? memory->reach - 1 : 1;
 }
 
 /* --- predicting ------------------------------------------------------------------------------------------------------------------- */
@@ -222,11 +255,15 @@ static double predict_view(struct cost_model *model, const struct scene *scene, 
 	return use(own->count ? own : others, view_size(scene), model->start_ms, fresh);
 }
 
+/* Of what a megapixel takes, before anything is measured. */
+static const double start_shares[PART_COUNT] = {[PART_OPTICS] = 0.15, [PART_SKY] = 0.2, [PART_FIELD] = 2, [PART_RADIOSITY] = 0.1};
+
 static void predict_picture(struct cost_model *model, const struct scene *scene, struct cost *cost)
 {
 	for (enum part part = 0; part < PART_COUNT; part++)
 		if (has_part(scene, part) && !is_known(&model->known[part], part_key(scene, part)))
-			cost->render_ms += use(&model->parts[part], part_size(scene, part), model->start_ms, &cost->fresh);
+			cost->render_ms += use(&model->parts[part][part_sight(scene, part)], part_size(scene, part),
+					       start_shares[part] * model->start_ms, &cost->fresh);
 	double view_ms = predict_view(model, scene, &cost->fresh);
 	if (scene->model.name == MODEL_REFERENCE && scene->model.time_budget_ms > 0)
 		view_ms = fmin(view_ms, scene->model.time_budget_ms);
@@ -252,7 +289,8 @@ struct cost cost_model_predict(struct cost_model *model, const struct scene *sce
 
 /* --- learning --------------------------------------------------------------------------------------------------------------------- */
 
-static const enum stage part_stages[PART_COUNT] = {[PART_SKY] = STAGE_SKY, [PART_FIELD] = STAGE_FIELD, [PART_RADIOSITY] = STAGE_RADIOSITY};
+static const enum stage part_stages[PART_COUNT] = {
+	[PART_OPTICS] = STAGE_OPTICS, [PART_SKY] = STAGE_SKY, [PART_FIELD] = STAGE_FIELD, [PART_RADIOSITY] = STAGE_RADIOSITY};
 
 /* The view takes what the parts leave of the whole: so that what no stage accounts for is part of the prediction too. */
 static void learn_picture(struct cost_model *model, const struct render_job *job, double now_ms)
@@ -261,12 +299,15 @@ static void learn_picture(struct cost_model *model, const struct render_job *job
 	double view_ms = job->spent_ms;
 	for (enum part part = 0; part < PART_COUNT; part++) {
 		const struct stage_timing *timing = &job->frame.timing[part_stages[part]];
-		if (!has_part(scene, part) || timing->reused || timing->milliseconds <= 0)
+		if (!has_part(scene, part))
 			continue;
-		line_fit_add(&model->parts[part], part_size(scene, part), timing->milliseconds, now_ms);
+		if (job->cost_ranks[part] > 0)
+			learn_reach(&model->known[part], job->cost_ranks[part] - 1, timing->reused);
+		if (timing->reused || timing->milliseconds <= 0)
+			continue;
+		line_fit_add(&model->parts[part][part_sight(scene, part)], part_size(scene, part), timing->milliseconds, now_ms);
 		view_ms -= timing->milliseconds;
 	}
-	expect_parts(model, scene);
 	/* What was cut short says nothing of the whole. */
 	const double done = scene->model.name == MODEL_REFERENCE ? (double)job->frame.samples / scene->model.samples : 1;
 	if (view_ms <= 0 || done <= 0)

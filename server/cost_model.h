@@ -1,8 +1,9 @@
 /* What a picture will cost, from what others did cost: milliseconds of the render thread and of an encoder. Any thread.
  *
  * Measured per kind of picture (model, clear or clouded, from below or above, PNG or EXR) as a fixed part and one for each megapixel, both
- * fitted with weights that fade by a tenth with every measurement. What frames share (sky, field, radiosity, droplets) counts apart, and
- * for nothing where a picture of late had the same. Lives in memory only.
+ * fitted with weights that fade by a tenth with every measurement. What frames share (optics of a sun, sky, field, radiosity, droplets)
+ * counts apart, and for nothing where a picture had the same of late; how long ago that may be follows from what stages say that they
+ * reused. Lives in memory only.
  *
  * A single odd measurement moves an estimate by no more than a tenth of fourfold, and estimates grow old: what was not measured for
  * COST_FRESH_MS is still good for an order but no reason to refuse anything (cost.fresh).
@@ -38,8 +39,9 @@ struct cost cost_model_predict(struct cost_model *model, const struct scene *sce
  * a client pays. */
 double cost_model_pace(struct cost_model *model);
 
-/* A picture of this scene is on its way: what it shares counts as known from now on. */
-void cost_model_expect(struct cost_model *model, const struct scene *scene);
+/* A picture of this scene is on its way: what it shares counts as known from now on. ranks: for the job, how long ago each part was asked
+ * for. */
+void cost_model_expect(struct cost_model *model, const struct scene *scene, int ranks[static COST_PARTS]);
 
 /* A job was rendered: job->spent_ms, prepared_ms and the stages of its frame say what it cost. */
 void cost_model_learn(struct cost_model *model, const struct render_job *job);

@@ -13,6 +13,7 @@
 #include <signal.h>
 #include <spawn.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,6 +35,8 @@ const struct decoder_limits decoder_default_limits = {
 
 /* That the process has for its answer beyond the time of the picture, the loading of its libraries included. */
 enum { GRACE_MS = 30000 };
+/* How often one that waits for an answer looks whether it is to give up. */
+enum { LOOK_MS = 100 };
 
 struct decoder {
 	const char *image_module;
@@ -41,6 +44,7 @@ struct decoder {
 	pthread_mutex_t mutex; /* one picture at a time, and what follows */
 	pid_t process;         /* 0: none runs */
 	int socket;
+	_Atomic bool given_up;
 };
 
 /* A picture on its way through the process. */
@@ -92,6 +96,11 @@ static void end_process(struct decoder *decoder)
 		;
 	decoder->process = 0;
 	decoder->socket = -1;
+}
+
+void decoder_give_up(struct decoder *decoder)
+{
+	decoder->given_up = true;
 }
 
 void decoder_destroy(struct decoder *decoder)
@@ -218,24 +227,24 @@ static bool receive_reply(const struct decoder *decoder, struct passage *passage
 	const double until_ms = clock_now_ms() + passage->request.wall_ms + GRACE_MS * SLOWNESS;
 	struct pollfd poll_fd = {.fd = decoder->socket, .events = POLLIN};
 	int ready;
-	do {
-		const double left_ms = until_ms - clock_now_ms();
-		ready = left_ms > 0 ? poll(&poll_fd, 1, (int)left_ms + 1) : 0;
-	} while (ready < 0 && errno == EINTR);
+	do
+		ready = poll(&poll_fd, 1, LOOK_MS);
+	while ((ready == 0 || (ready < 0 && errno == EINTR)) && !decoder->given_up && clock_now_ms() < until_ms);
 	return ready > 0 && recv(decoder->socket, &passage->reply, sizeof passage->reply, 0) == (ssize_t)sizeof passage->reply;
 }
 
 /* The process itself reads no picture, so that whatever ended it was not this one: it is replaced, once. */
 static bool exchange(struct decoder *decoder, struct passage *passage)
 {
-	for (int attempt = 0; attempt < 2; attempt++) {
+	for (int attempt = 0; attempt < 2 && !decoder->given_up; attempt++) {
 		if (!start_process(decoder))
 			return false;
 		if (send_request(decoder, passage) && receive_reply(decoder, passage))
 			return true;
 		end_process(decoder);
 	}
-	log_error("decoder: its process did not answer");
+	if (!decoder->given_up)
+		log_error("decoder: its process did not answer");
 	return false;
 }
 
@@ -277,7 +286,7 @@ static enum decoder_result pass(struct decoder *decoder, struct passage *passage
 	if (left_ms > 0)
 		answered = open_passage(passage, fd) && exchange(decoder, passage);
 	pthread_mutex_unlock(&decoder->mutex);
-	return left_ms <= 0 ? DECODER_LATE : answered ? judge(passage) : DECODER_FAILED;
+	return left_ms <= 0 || decoder->given_up ? DECODER_LATE : answered ? judge(passage) : DECODER_FAILED;
 }
 
 static bool are_finite(const float *values, size_t count)

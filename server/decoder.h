@@ -29,6 +29,8 @@ struct decoder;
 
 /* Starts no process yet. image_module: as in image_module_load; stays the caller's. NULL (and a log line) when out of memory. */
 struct decoder *decoder_create(const char *image_module, const struct decoder_limits *limits);
+/* Ends what is being decoded (DECODER_LATE), and decodes nothing more. Any thread, at any time. */
+void decoder_give_up(struct decoder *decoder);
 /* Ends the process. Takes NULL. */
 void decoder_destroy(struct decoder *decoder);
 

@@ -323,7 +323,8 @@ static struct MHD_Daemon *start_daemon(struct service *service, const struct add
 				MHD_OPTION_NOTIFY_CONNECTION, on_connection, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed, service,
 				MHD_OPTION_CONNECTION_MEMORY_LIMIT, connection_memory(config), MHD_OPTION_CONNECTION_LIMIT,
 				most * HTTP_THREADS, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_SECONDS, MHD_OPTION_THREAD_POOL_SIZE,
-				(unsigned)HTTP_THREADS, certificate, tls_retrieve, MHD_OPTION_HTTPS_PRIORITIES, TLS_PRIORITIES, MHD_OPTION_END);
+				(unsigned)HTTP_THREADS, certificate, tls_retrieve, MHD_OPTION_HTTPS_PRIORITIES, TLS_PRIORITIES,
+				MHD_OPTION_END);
 }
 
 /* A process is often given fewer descriptors than it may have. */

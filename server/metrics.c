@@ -18,6 +18,8 @@ static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/compa
 						     "/openapi.yaml", "/healthz",    "/readyz",         "/metrics",    "other"};
 static const char *const rejection_names[REJECTION_COUNT] = {"full",        "pixels",   "predicted_late", "memory",
 							     "connections", "starting", "shutting_down",  "unavailable"};
+static const char *const image_names[IMAGE_SOURCE_COUNT] = {
+	[IMAGE_FROM_CACHE] = "hit", [IMAGE_SHARED] = "shared", [IMAGE_MISSED] = "miss", [IMAGE_BYPASSED] = "bypass"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
 static const char *const phase_names[RENDER_PHASE_COUNT] = {
 	[RENDER_PHASE_QUEUED] = "queued", [RENDER_PHASE_RENDERING] = "rendering", [RENDER_PHASE_ENCODING] = "encoding"};
@@ -52,6 +54,7 @@ struct metrics {
 	struct histogram stages[TIMING_COUNT];
 	struct histogram pictures; /* by pixels */
 	unsigned long reused[TIMING_COUNT];
+	unsigned long images[IMAGE_SOURCE_COUNT];
 	unsigned long rejected[REJECTION_COUNT];
 	unsigned long ended[END_COUNT];
 	unsigned long cancelled[RENDER_PHASE_COUNT];
@@ -129,6 +132,13 @@ void metrics_count_timings(struct metrics *metrics, const struct timings *timing
 	pthread_mutex_unlock(&metrics->mutex);
 }
 
+void metrics_count_image(struct metrics *metrics, enum metrics_image source)
+{
+	pthread_mutex_lock(&metrics->mutex);
+	metrics->images[source]++;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
 void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection reason)
 {
 	pthread_mutex_lock(&metrics->mutex);
@@ -136,10 +146,16 @@ void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection rea
 	pthread_mutex_unlock(&metrics->mutex);
 }
 
-void metrics_count_end(struct metrics *metrics, enum metrics_end end, double spent_ms)
+void metrics_count_end(struct metrics *metrics, enum metrics_end end)
 {
 	pthread_mutex_lock(&metrics->mutex);
 	metrics->ended[end]++;
+	pthread_mutex_unlock(&metrics->mutex);
+}
+
+void metrics_count_waste(struct metrics *metrics, enum metrics_end end, double spent_ms)
+{
+	pthread_mutex_lock(&metrics->mutex);
 	metrics->wasted_ms[end] += spent_ms;
 	pthread_mutex_unlock(&metrics->mutex);
 }
@@ -397,6 +413,22 @@ static void write_keys(struct text *text, const struct metrics_now *now)
 	text_printf(text, "stratus_certificate_expiry_seconds %lld\n", (long long)now->certificate_expiry);
 }
 
+static void write_images(struct text *text, const struct metrics *metrics, const struct image_cache_counts *finished)
+{
+	write_family(text, "image_requests", "counter",
+		     "Requests for images, by what the finished images in memory or in work had for them.");
+	for (int i = 0; i < IMAGE_SOURCE_COUNT; i++)
+		text_printf(text, "stratus_image_requests_total{source=\"%s\"} %lu\n", image_names[i], metrics->images[i]);
+	write_family(text, "image_cache_bytes", "gauge", "Memory of finished images.");
+	text_printf(text, "stratus_image_cache_bytes %zu\n", finished->bytes);
+	write_family(text, "image_cache_limit_bytes", "gauge", "Memory that finished images may take.");
+	text_printf(text, "stratus_image_cache_limit_bytes %zu\n", finished->bound);
+	write_family(text, "image_cache_images", "gauge", "Finished images in memory.");
+	text_printf(text, "stratus_image_cache_images %zu\n", finished->images);
+	write_family(text, "image_cache_evictions", "counter", "Finished images dropped for want of room.");
+	text_printf(text, "stratus_image_cache_evictions_total %llu\n", (unsigned long long)finished->evicted);
+}
+
 /* The read-back remembers nothing. */
 static void write_cache(struct text *text, const struct metrics_now *now)
 {
@@ -483,6 +515,7 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_queue(&text, copy, now);
 	write_admission(&text, copy, now);
 	write_care(&text, &now->care);
+	write_images(&text, copy, &now->finished);
 	write_tracings(&text, copy, now);
 	write_droplets(&text, &now->droplets);
 	write_assets(&text, now);

@@ -9,6 +9,7 @@
 #include "renderer/droplet_store.h"
 #include "server/api_keys.h"
 #include "server/connections.h"
+#include "server/image_cache.h"
 #include "server/problem.h"
 #include "server/render_queue.h"
 #include "server/renderer_care.h"
@@ -46,6 +47,8 @@ enum metrics_rejection {
 	REJECTED_UNAVAILABLE,
 	REJECTION_COUNT
 };
+/* Where the image of an answer came from. */
+enum metrics_image { IMAGE_FROM_CACHE, IMAGE_SHARED, IMAGE_MISSED, IMAGE_BYPASSED, IMAGE_SOURCE_COUNT };
 enum metrics_end { ENDED_EXPIRED, ENDED_ABANDONED, ENDED_FAILED, END_COUNT };
 
 struct metrics;
@@ -61,9 +64,12 @@ void metrics_count_problem(struct metrics *metrics, enum problem_kind kind);
 void metrics_count_picture(struct metrics *metrics, double pixels);
 /* The stages of an answered render. Stages taken from memory are counted apart: their zeros would hide what the work costs. */
 void metrics_count_timings(struct metrics *metrics, const struct timings *timings);
+/* A request for an image that was not answered without one. */
+void metrics_count_image(struct metrics *metrics, enum metrics_image source);
 void metrics_count_rejection(struct metrics *metrics, enum metrics_rejection reason);
-/* Renders that were accepted and brought no picture, and what the render thread spent on them. */
-void metrics_count_end(struct metrics *metrics, enum metrics_end end, double spent_ms);
+/* Requests that were accepted and got no picture; and what the render thread spent on renders that brought none. */
+void metrics_count_end(struct metrics *metrics, enum metrics_end end);
+void metrics_count_waste(struct metrics *metrics, enum metrics_end end, double spent_ms);
 /* Those of them that nobody waited for any more, by how far they came; and what a render took over what was predicted. */
 void metrics_count_cancellation(struct metrics *metrics, enum render_phase at);
 void metrics_count_prediction(struct metrics *metrics, double ratio);
@@ -84,6 +90,7 @@ struct metrics_now {
 	struct droplet_store_counts droplets;
 	struct api_keys *keys;
 	time_t certificate_expiry; /* 0: there is none */
+	struct image_cache_counts finished;
 	size_t assets;
 	uint64_t asset_bytes, asset_map_bytes;        /* on disk; decoded, in memory */
 	size_t cache_bytes[STAGE_COUNT], cache_limit; /* on the GPU */

@@ -24,7 +24,9 @@ struct render_queue {
 
 bool render_job_is_over(struct render_job *job)
 {
-	bool expired = clock_now_ms() >= job->deadline_ms, over = expired || job->abandoned(job);
+	/* In this order: who joins after the question has moved the deadline, or is told that the job is over. */
+	const double now_ms = clock_now_ms();
+	const bool abandoned = job->abandoned(job), expired = now_ms >= job->deadline_ms, over = expired || abandoned;
 	if (over)
 		job->outcome = expired ? RENDER_OUTCOME_EXPIRED : RENDER_OUTCOME_ABANDONED;
 	return over;

@@ -27,13 +27,17 @@ enum render_phase { RENDER_PHASE_QUEUED, RENDER_PHASE_RENDERING, RENDER_PHASE_EN
 /* A picture of the reference lets others pass after so long, about a picture's time: milliseconds. */
 #define RENDER_TURN_MS 250.0
 
+/* Parts of a picture that others may share (cost_model.h). */
+enum { COST_PARTS = 4 };
+
 /* One picture to render, or the light of a sky to compute. Belongs to its maker, who keeps it until `finished` was called. */
 struct render_job {
 	const struct scene *scene;
 	const struct sky_directions *directions; /* NULL: a picture; else the light of the scene's clear sky there */
-	double deadline_ms;                      /* on the clock of clock.h */
+	_Atomic double deadline_ms;              /* on the clock of clock.h; moved by others who come to wait for it too */
 	double queued_ms;                        /* likewise, set by render_queue_push */
 	const char *client;                      /* key of whom it is for; must live as long. NULL: nobody's in particular */
+	int cost_ranks[COST_PARTS];              /* the cost model's own */
 	double predicted_ms;                     /* of the render thread's time; 0: unknown */
 
 	/* Asked at dequeue and between passes: does nobody wait any more? */

@@ -3,6 +3,7 @@
 #include "renderer/log.h"
 #include "server/clock.h"
 #include "server/kernel_file.h"
+#include "server/transfers.h"
 
 #include <limits.h>
 #include <pthread.h>
@@ -32,6 +33,7 @@ struct render_thread {
 	int failures;               /* on end */
 	struct render_job *pending; /* a reference in the queue that is on its way, or NULL */
 	double idle_since_ms;
+	struct transfers transfers;
 };
 
 /* --- jobs -------------------------------------------------------------------------------------------------------------------------- */
@@ -43,9 +45,15 @@ struct running_job {
 	double pause_ms; /* from when on others may pass */
 };
 
+/* So often an idle thread looks for new work while it waits for a picture. */
+#define TRAVEL_MS 1.0
+
+static void end_arrived(struct render_thread *thread, double milliseconds);
+
 static bool is_cancelled(void *context)
 {
 	const struct running_job *running = context;
+	end_arrived(running->thread, 0);
 	heartbeat_beat(&running->thread->heartbeat);
 	return render_job_is_over(running->job);
 }
@@ -70,8 +78,8 @@ static enum render_result ask_renderer(struct render_thread *thread, struct rend
 	if (job->directions)
 		return renderer_sky_light(renderer_care_renderer(thread->care), job->scene, job->directions, is_cancelled, &running,
 					  &job->light);
-	return renderer_render_some(renderer_care_renderer(thread->care), job->scene, is_cancelled, is_paused, &running, &job->pending,
-				    &job->frame);
+	return renderer_start(renderer_care_renderer(thread->care), job->scene, is_cancelled, is_paused, &running, &job->pending,
+			      &job->frame);
 }
 
 static enum render_outcome outcome_of(struct render_thread *thread, struct render_job *job, enum render_result result)
@@ -92,6 +100,38 @@ static bool is_interrupted(struct render_thread *thread, struct render_job *job,
 		return false;
 	renderer_care_count_repeat(thread->care);
 	return true;
+}
+
+/* What a turn took is its client's to pay. */
+static void settle(struct render_thread *thread, struct render_job *job, double took_ms)
+{
+	job->spent_ms += took_ms;
+	render_queue_settle(thread->queue, job, took_ms);
+}
+
+/* Ends a job, or has it done again. */
+static void end_job(struct render_thread *thread, struct render_job *job, enum render_result result, double took_ms)
+{
+	settle(thread, job, took_ms);
+	if (is_interrupted(thread, job, result)) {
+		render_queue_pass(thread->queue, job);
+		return;
+	}
+	job->outcome = outcome_of(thread, job, result);
+	if (job->outcome == RENDER_OUTCOME_OK && job->interruptions == 0)
+		cost_model_learn(thread->costs, job);
+	job->finished(job);
+}
+
+/* Ends the jobs whose pictures have arrived, waiting so long for the next. */
+static void end_arrived(struct render_thread *thread, double milliseconds)
+{
+	enum render_result result;
+	double took_ms;
+	for (struct render_job *job;
+	     (job = transfers_take(&thread->transfers, renderer_care_renderer(thread->care), milliseconds, &result, &took_ms));
+	     milliseconds = 0)
+		end_job(thread, job, result, took_ms);
 }
 
 /* What was begun is given back to the renderer even when it is over. */
@@ -120,9 +160,19 @@ static void forget_pending(struct render_thread *thread)
 	renderer_drop_pending(&job->pending); /* whoever drops what is over may do so with the job from here on */
 }
 
+/* Pictures that travel arrive, or turn out to be lost. */
+static void await_transfers(struct render_thread *thread)
+{
+	heartbeat_begin(&thread->heartbeat, thread->config->hang_ms);
+	while (thread->transfers.count > 0)
+		end_arrived(thread, TRAVEL_MS);
+	heartbeat_end(&thread->heartbeat);
+}
+
 static void recover(struct render_thread *thread, enum care_reason reason)
 {
 	thread->state = RENDER_THREAD_RECOVERING;
+	await_transfers(thread);
 	forget_pending(thread);
 	thread->failures = 0;
 	thread->state = renderer_care_rebuild(thread->care, reason) ? RENDER_THREAD_READY : RENDER_THREAD_FAILED;
@@ -167,22 +217,34 @@ static struct render_job *await_job(struct render_thread *thread)
 	return job;
 }
 
+static bool is_any(struct render_job *job, void *context)
+{
+	(void)job, (void)context;
+	return true;
+}
+
+/* While pictures travel the renderer goes on with what there is to do, and looks for their arrival else. */
+static struct render_job *next_while_travelling(struct render_thread *thread)
+{
+	struct render_job *job = NULL;
+	if (thread->transfers.count > 0)
+		heartbeat_begin(&thread->heartbeat, thread->config->hang_ms);
+	while (!job && thread->transfers.count > 0) {
+		job = render_queue_pop_wanted(thread->queue, thread->pending ? may_pass : is_any, NULL);
+		if (!job)
+			end_arrived(thread, TRAVEL_MS);
+	}
+	heartbeat_end(&thread->heartbeat);
+	return job;
+}
+
 /* The next job; while a reference is on its way, which stands in the queue too, one that may pass it, or that itself. */
 static struct render_job *next_job(struct render_thread *thread)
 {
-	struct render_job *job = thread->pending ? render_queue_pop_wanted(thread->queue, may_pass, NULL) : NULL;
+	struct render_job *job = next_while_travelling(thread);
+	if (!job && thread->pending)
+		job = render_queue_pop_wanted(thread->queue, may_pass, NULL);
 	return job ? job : await_job(thread);
-}
-
-/* false: the job goes back to the queue. */
-static bool end_job(struct render_thread *thread, struct render_job *job, enum render_result result)
-{
-	if (result == RENDER_UNFINISHED || is_interrupted(thread, job, result))
-		return false;
-	job->outcome = outcome_of(thread, job, result);
-	if (job->outcome == RENDER_OUTCOME_OK && job->interruptions == 0)
-		cost_model_learn(thread->costs, job);
-	return true;
 }
 
 static void run_jobs(struct render_thread *thread)
@@ -190,19 +252,24 @@ static void run_jobs(struct render_thread *thread)
 	for (struct render_job *job; (job = next_job(thread));) {
 		const double start = clock_now_ms();
 		const bool was_pending = job->pending;
+		thread->idle_since_ms = 0;
 		heartbeat_begin(&thread->heartbeat, thread->config->hang_ms);
 		job->phase = RENDER_PHASE_RENDERING;
 		const enum render_result result = run_job(thread, job);
+		const bool unfinished = result == RENDER_UNFINISHED;
 		const double took = clock_now_ms() - start;
 		heartbeat_end(&thread->heartbeat);
-		job->spent_ms += took;
-		render_queue_settle(thread->queue, job, took);
-		if (result == RENDER_UNFINISHED || was_pending)
-			thread->pending = result == RENDER_UNFINISHED ? job : NULL;
-		if (end_job(thread, job, result))
-			job->finished(job);
-		else
+		if (unfinished || was_pending)
+			thread->pending = unfinished ? job : NULL;
+		if (unfinished) {
+			settle(thread, job, took);
 			render_queue_pass(thread->queue, job);
+		} else if (result == RENDER_OK && job->frame.transfer) {
+			transfers_add(&thread->transfers, job, start);
+		} else {
+			end_job(thread, job, result, took);
+		}
+		end_arrived(thread, 0);
 		look_after_renderer(thread);
 		if (thread->state == RENDER_THREAD_FAILED)
 			return;

@@ -5,6 +5,7 @@
 #include "server/clock.h"
 #include "server/cors.h"
 #include "server/entity_tag.h"
+#include "server/image_cache.h"
 #include "server/service.h"
 
 #include <gnutls/gnutls.h>
@@ -21,6 +22,23 @@ struct MHD_Response *response_create(struct request *request, char *data, size_t
 	if (!response) {
 		log_error("response_create: out of memory");
 		free(data);
+	}
+	return response;
+}
+
+static void release_image(void *image)
+{
+	finished_image_release(image);
+}
+
+struct MHD_Response *response_create_shared(struct request *request, struct finished_image *image)
+{
+	request->bytes = image->size;
+	struct MHD_Response *response =
+		MHD_create_response_from_buffer_with_free_callback_cls(image->size, image->data, release_image, image);
+	if (!response) {
+		log_error("response_create_shared: out of memory");
+		finished_image_release(image);
 	}
 	return response;
 }
@@ -48,6 +66,12 @@ static void format_timing(struct request *request, char timing[static SERVER_TIM
 	timings_format(&request->timings, timing);
 }
 
+static void keep_private(const struct request *request, struct MHD_Response *response)
+{
+	if (*request->key && MHD_del_response_header(response, "Cache-Control", CACHE_KEEP) == MHD_YES)
+		response_set(response, "Cache-Control", CACHE_KEEP_PRIVATE);
+}
+
 enum MHD_Result response_send(struct request *request, unsigned status, struct MHD_Response *response)
 {
 	if (!response)
@@ -56,6 +80,7 @@ enum MHD_Result response_send(struct request *request, unsigned status, struct M
 	format_timing(request, timing);
 	response_set(response, "Server-Timing", timing);
 	cors_allow(request, response);
+	keep_private(request, response);
 	response_set(response, "X-Request-Id", request->id);
 	if (request->closes || connection_is_surplus(request->socket))
 		response_set(response, "Connection", "close");

@@ -6,12 +6,17 @@
 
 /* Cache-Control of what a scene or a query determines: kept, and asked for again by its entity tag after an hour. */
 #define CACHE_KEEP "public, max-age=3600"
+/* The same of an answer to who showed a key: "public" would let a cache in front give it to those who have none (RFC 9111, 3.5). */
+#define CACHE_KEEP_PRIVATE "private, max-age=3600"
 /* Of what may change under its address at any time: kept, but asked for again by its entity tag every time. */
 #define CACHE_ASK  "no-cache"
 #define CACHE_NONE "no-store"
 
 /* The answer to a request. Takes over malloc'd data (also on failure). NULL when out of memory. */
 struct MHD_Response *response_create(struct request *request, char *data, size_t size);
+/* Likewise of an image that others hold too. Takes over one hold of it. */
+struct finished_image;
+struct MHD_Response *response_create_shared(struct request *request, struct finished_image *image);
 /* For a HEAD that is answered without computing, so that the length is unknown. */
 struct MHD_Response *response_create_unsized(void);
 void response_set(struct MHD_Response *response, const char *name, const char *value);

@@ -263,6 +263,9 @@ static void on_rendered(struct render_job *job)
 	preparation_release(service->preparation, job);
 	scene_assets_release(run->scene);
 	work->ended = job;
+	/* Here and now: several pictures of a comparison would fill the places between renderer and memory. */
+	if (job->outcome == RENDER_OUTCOME_OK && !frame_take_pixels(&job->frame))
+		job->outcome = RENDER_OUTCOME_NO_MEMORY;
 	if (job->outcome == RENDER_OUTCOME_FAILED)
 		log_error("request %s: rendering failed", work->request->id);
 	if (job->outcome != RENDER_OUTCOME_OK) {

@@ -59,6 +59,7 @@ enum MHD_Result route_metrics(struct request *request)
 		.tracings_limit = SERVICE_TRACINGS_MAX,
 		.cache_limit = (size_t)service->config->cache_mb << 20,
 	};
+	now.finished = image_cache_counts(service->finished);
 	asset_store_usage(service->assets, &now.assets, &now.asset_bytes);
 	now.asset_map_bytes = asset_maps_bytes(service->maps);
 	for (int stage = 0; stage < STAGE_COUNT && service->ready; stage++)

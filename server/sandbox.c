@@ -13,13 +13,11 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-/* AddressSanitizer's shadow is terabytes of address space. */
-#ifdef __SANITIZE_ADDRESS__
-enum { BOUND_MEMORY = 0 };
-#elif defined __SANITIZE_THREAD__
-enum { BOUND_MEMORY = 0 };
+/* AddressSanitizer's shadow is terabytes of address space, and UndefinedBehaviorSanitizer asks by a pipe whether memory can be read. */
+#if defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
+enum { IS_SANITIZED = 1 };
 #else
-enum { BOUND_MEMORY = 1 };
+enum { IS_SANITIZED = 0 };
 #endif
 
 enum { FILES_MAX = 16 };
@@ -56,7 +54,7 @@ static void volunteer(void)
 static bool set_limits(const struct sandbox_limits *limits)
 {
 	const uint64_t taken = address_space();
-	if (BOUND_MEMORY && (taken == 0 || !limit(RLIMIT_AS, taken + limits->memory_bytes, taken + limits->memory_bytes)))
+	if (!IS_SANITIZED && (taken == 0 || !limit(RLIMIT_AS, taken + limits->memory_bytes, taken + limits->memory_bytes)))
 		return false;
 	return limit(RLIMIT_CPU, limits->cpu_seconds, limits->cpu_seconds + 1) && limit(RLIMIT_FSIZE, 0, 0) && limit(RLIMIT_CORE, 0, 0) &&
 	       limit(RLIMIT_NOFILE, FILES_MAX, FILES_MAX);
@@ -72,7 +70,8 @@ static bool set_limits(const struct sandbox_limits *limits)
 
 #ifdef THIS_ARCHITECTURE
 
-/* Memory, the files that are open, time, and the end. Nothing that opens, starts, connects or signals another process. */
+/* Memory, the files that are open, time, and the end. Nothing that opens, starts or connects, and nothing that takes the number of a
+ * process, which may be the daemon's. */
 static const uint32_t allowed[] = {
 	__NR_read,
 	__NR_pread64,
@@ -99,17 +98,25 @@ static const uint32_t allowed[] = {
 	__NR_rt_sigprocmask,
 	__NR_rt_sigreturn,
 	__NR_sigaltstack,
-	__NR_tgkill,
 	__NR_getrusage,
-	__NR_prlimit64,
 	__NR_restart_syscall,
 	__NR_exit,
 	__NR_exit_group,
 };
+static const uint32_t sanitizers_own[] = {
+	__NR_pipe2,
+#ifdef __NR_pipe
+	__NR_pipe,
+#endif
+};
 /* These too, but never for memory that is executed. */
 static const uint32_t mapping[] = {__NR_mmap, __NR_mprotect};
 
-enum { ALLOWED = sizeof allowed / sizeof *allowed, MAPPING = sizeof mapping / sizeof *mapping };
+enum {
+	ALLOWED = sizeof allowed / sizeof *allowed,
+	OWN = sizeof sanitizers_own / sizeof *sanitizers_own,
+	MAPPING = sizeof mapping / sizeof *mapping
+};
 
 #define LOAD(member)           BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, member))
 #define UNLESS(value, skipped) BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, 0, skipped)
@@ -117,7 +124,7 @@ enum { ALLOWED = sizeof allowed / sizeof *allowed, MAPPING = sizeof mapping / si
 
 static void filter_calls(void)
 {
-	struct sock_filter code[6 + 2 * ALLOWED + 5 * MAPPING];
+	struct sock_filter code[11 + 2 * (ALLOWED + OWN) + 5 * MAPPING];
 	unsigned short n = 0;
 	/* Numbers mean other calls on another architecture; those of x32 are numbers of x86-64 with a bit more, and not in the list. */
 	code[n++] = (struct sock_filter)LOAD(arch);
@@ -128,6 +135,16 @@ static void filter_calls(void)
 		code[n++] = (struct sock_filter)UNLESS(allowed[i], 1);
 		code[n++] = (struct sock_filter)ANSWER(SECCOMP_RET_ALLOW);
 	}
+	for (int i = 0; IS_SANITIZED && i < OWN; i++) {
+		code[n++] = (struct sock_filter)UNLESS(sanitizers_own[i], 1);
+		code[n++] = (struct sock_filter)ANSWER(SECCOMP_RET_ALLOW);
+	}
+	/* abort() sends itself a signal; of another process the number is not taken. */
+	code[n++] = (struct sock_filter)UNLESS(__NR_tgkill, 4);
+	code[n++] = (struct sock_filter)LOAD(args[0]);
+	code[n++] = (struct sock_filter)UNLESS((uint32_t)getpid(), 1);
+	code[n++] = (struct sock_filter)ANSWER(SECCOMP_RET_ALLOW);
+	code[n++] = (struct sock_filter)ANSWER(SECCOMP_RET_ERRNO | EPERM);
 	for (int i = 0; i < MAPPING; i++) {
 		code[n++] = (struct sock_filter)UNLESS(mapping[i], 4);
 		code[n++] = (struct sock_filter)LOAD(args[2]);

@@ -2,8 +2,8 @@
 
 #include <stdio.h>
 
-const char *const timing_names[TIMING_COUNT] = {"queue", "optics",   "sky",     "field",  "radiosity",
-						"view",  "readback", "compare", "encode", "total"};
+const char *const timing_names[TIMING_COUNT] = {"queue",    "optics",  "sky",    "field", "radiosity", "view",
+						"readback", "compare", "encode", "cache", "shared",    "total"};
 
 void timings_set(struct timings *timings, enum timing timing, double milliseconds)
 {
@@ -23,6 +23,16 @@ void timings_set_frame(struct timings *timings, const struct frame *frame)
 	}
 	timings->radiosity_passes = frame->radiosity_passes;
 	timings->radiosity_residual = frame->radiosity_residual;
+}
+
+void timings_set_reused(struct timings *timings)
+{
+	for (int i = 0; i <= TIMING_ENCODE; i++) {
+		if (i == TIMING_COMPARE)
+			continue;
+		timings_set(timings, (enum timing)i, 0);
+		timings->entry[i].reused = i != TIMING_QUEUE;
+	}
 }
 
 void timings_add_frame(struct timings *timings, const struct timings *frame)
@@ -58,6 +68,8 @@ void timings_format(const struct timings *timings, char text[static SERVER_TIMIN
 		char description[80] = "";
 		if (timings->entry[i].reused)
 			snprintf(description, sizeof description, ";desc=\"reused\"");
+		else if (i == TIMING_CACHE || i == TIMING_SHARED)
+			snprintf(description, sizeof description, ";desc=\"hit\"");
 		else if (i == TIMING_RADIOSITY && timings->radiosity_passes > 0)
 			snprintf(description, sizeof description, ";desc=\"%d passes, residual %.2g\"", timings->radiosity_passes,
 				 timings->radiosity_residual);

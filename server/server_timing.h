@@ -14,6 +14,8 @@ enum timing {
 	TIMING_READBACK,
 	TIMING_COMPARE,
 	TIMING_ENCODE,
+	TIMING_CACHE,  /* taking a finished image from memory */
+	TIMING_SHARED, /* waiting for the same image as another request */
 	TIMING_TOTAL,
 	TIMING_COUNT
 };
@@ -37,6 +39,9 @@ void timings_set(struct timings *timings, enum timing timing, double millisecond
 
 /* Takes over the stages of a rendered frame. */
 void timings_set_frame(struct timings *timings, const struct frame *frame);
+
+/* Says of all that it takes to render that it was taken from memory, since the finished image was. */
+void timings_set_reused(struct timings *timings);
 
 /* Adds those of another one; what any of them had to make was not reused. */
 void timings_add_frame(struct timings *timings, const struct timings *frame);

@@ -115,6 +115,8 @@ struct service *service_create(const struct config *config)
 	service->config = config;
 	service->listening_socket = -1;
 	service->metrics = metrics_create();
+	service->finished = image_cache_create((size_t)config->image_cache);
+	service->flights = service->finished ? flights_create(service->finished) : NULL;
 	const struct render_queue_limits limits = queue_limits(config);
 	service->queue = render_queue_create(&limits);
 	service->costs = cost_model_create();
@@ -128,8 +130,8 @@ struct service *service_create(const struct config *config)
 	service->computers = worker_pool_create(COMPUTER_COUNT, (size_t)config->queue_length, COMPUTER_NICE);
 	service->tracers = worker_pool_create(1, SERVICE_TRACINGS_MAX, TRACER_NICE);
 	service->decoders = worker_pool_create(1, (size_t)config->queue_length, DECODER_NICE);
-	const bool pools =
-		service->connections && service->costs && service->workers && service->computers && service->tracers && service->decoders;
+	const bool pools = service->connections && service->costs && service->flights && service->workers && service->computers &&
+			   service->tracers && service->decoders;
 	service->keys = api_keys_create(config->keys);
 	const bool guarded = service->keys && (!config->tls_cert || tls_load(config->tls_cert, config->tls_key));
 	if (pools && guarded && open_assets(service) && service->metrics && service->queue && http_start(service) &&
@@ -168,6 +170,14 @@ static void drain(struct service *service)
 	while (service->in_flight > 0 && clock_now_ms() < limit)
 		usleep(5000);
 	service->giving_up = true;
+	if (service->decoder)
+		decoder_give_up(service->decoder);
+}
+
+/* Renders may outlast those who waited for them, for as long as a pass takes. */
+static bool is_working(const struct service *service)
+{
+	return service->suspended > 0 || (service->flights && flights_open(service->flights) > 0);
 }
 
 /* libmicrohttpd must not stop while a connection is suspended. Jobs are abandoned between two passes, so this is quick unless one hangs;
@@ -175,9 +185,9 @@ static void drain(struct service *service)
 static void await_suspended(struct service *service)
 {
 	double limit = clock_now_ms() + 10000;
-	while (service->suspended > 0 && clock_now_ms() < limit)
+	while (is_working(service) && clock_now_ms() < limit)
 		usleep(1000);
-	if (service->suspended > 0) {
+	if (is_working(service)) {
 		log_error("shutdown: a render hangs, leaving it");
 		_exit(EXIT_FAILURE);
 	}
@@ -202,6 +212,8 @@ void service_destroy(struct service *service)
 	worker_pool_destroy(service->tracers);
 	worker_pool_destroy(service->decoders);
 	decoder_destroy(service->decoder);
+	flights_destroy(service->flights);
+	image_cache_destroy(service->finished);
 	asset_maps_destroy(service->maps);
 	asset_store_destroy(service->assets);
 	render_queue_destroy(service->queue);

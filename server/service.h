@@ -9,6 +9,7 @@
 #include "server/decoder.h"
 #include "server/connections.h"
 #include "server/cost_model.h"
+#include "server/flight.h"
 #include "server/metrics.h"
 #include "server/preparation.h"
 #include "server/render_queue.h"
@@ -44,6 +45,8 @@ struct service {
 	struct worker_pool *tracers;     /* one thread that traces photons, on all processors, behind everything else */
 	struct worker_pool *decoders;    /* one thread that has uploaded pictures read, one at a time since each takes memory */
 	struct api_keys *keys;
+	struct image_cache *finished; /* images, to be answered again */
+	struct flights *flights;      /* renders that several requests may wait for */
 	struct asset_store *assets;
 	struct asset_maps *maps;
 	struct decoder *decoder;

@@ -1,6 +1,6 @@
-/* One connection of a load generator: a request out, its answer in, without waiting. It reads no more of an answer than a load needs (status,
- * length, Server-Timing) and throws the body away in the kernel, so that it costs little beside what it measures. HTTP/1.1 without TLS. One
- * thread.
+/* One connection of a load generator: a request out, its answer in, without waiting. It reads no more of an answer than a load needs
+ * (status, length, Server-Timing) and throws the body away in the kernel, so that it costs little beside what it measures. HTTP/1.1 without
+ * TLS. One thread.
  */
 #ifndef STRATUS_CLIENTS_BENCH_CONNECTION_H
 #define STRATUS_CLIENTS_BENCH_CONNECTION_H

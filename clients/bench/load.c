@@ -134,7 +134,8 @@ static void record_error(struct load *load, bool measured, enum load_error error
 		load->result->error[error]++;
 }
 
-/* --- connections ----------------------------------------------------------------------------------------------------------------------- */
+/* --- connections -----------------------------------------------------------------------------------------------------------------------
+ */
 
 static void release(struct load *load, int index)
 {
@@ -166,9 +167,8 @@ static enum connection_event begin(struct load *load, int index, struct mix_requ
 /* Goes on with a connection after something happened to it. */
 static void settle(struct load *load, int index, enum connection_event event)
 {
-	static const enum load_error errors[] = {[CONNECTION_REFUSED] = LOAD_NO_CONNECTION,
-						 [CONNECTION_BROKEN] = LOAD_BROKEN,
-						 [CONNECTION_CONFUSED] = LOAD_NO_HTTP};
+	static const enum load_error errors[] = {
+		[CONNECTION_REFUSED] = LOAD_NO_CONNECTION, [CONNECTION_BROKEN] = LOAD_BROKEN, [CONNECTION_CONFUSED] = LOAD_NO_HTTP};
 	struct connection *connection = &load->connection[index];
 	if (event == CONNECTION_STALE) {
 		struct mix_request again = connection->request;
@@ -241,7 +241,8 @@ static void scan(struct load *load, int64_t now)
 	load->scan_ns = now + SCAN_NS;
 }
 
-/* --- the plan ---------------------------------------------------------------------------------------------------------------------------- */
+/* --- the plan ----------------------------------------------------------------------------------------------------------------------------
+ */
 
 /* Even times are counted from the beginning, so that rounding does not add up. */
 static void plan_next(struct load *load)
@@ -296,7 +297,8 @@ static void drive(struct load *load)
 	load->scan_ns = load->begin_ns + SCAN_NS;
 	load->measure_ns = load->begin_ns + (int64_t)(load->settings->warm_up_s * SECOND_NS);
 	load->end_ns = load->measure_ns + (int64_t)(load->settings->duration_s * SECOND_NS);
-	for (int64_t now = load->begin_ns; !load->failed && (plan_is_open(load, now) || load->busy > 0 || load->due.count > 0); now = now_ns()) {
+	for (int64_t now = load->begin_ns; !load->failed && (plan_is_open(load, now) || load->busy > 0 || load->due.count > 0);
+	     now = now_ns()) {
 		follow_plan(load, now);
 		await(load);
 		if (now >= load->scan_ns)
@@ -304,7 +306,8 @@ static void drive(struct load *load)
 	}
 }
 
-/* --- a run ----------------------------------------------------------------------------------------------------------------------------- */
+/* --- a run -----------------------------------------------------------------------------------------------------------------------------
+ */
 
 static bool create_result(struct load_result *result, int kinds)
 {

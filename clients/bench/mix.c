@@ -12,10 +12,10 @@
 struct mix_kind {
 	char name[MIX_NAME_SIZE];
 	double weight;
-	char *path;     /* of a GET; NULL: a POST of the scene */
-	json_t *scene;  /* an object */
-	json_t *vary;   /* member: [low, high], or NULL */
-	char *bytes;    /* of a request that is always the same */
+	char *path;    /* of a GET; NULL: a POST of the scene */
+	json_t *scene; /* an object */
+	json_t *vary;  /* member: [low, high], or NULL */
+	char *bytes;   /* of a request that is always the same */
 	size_t size;
 };
 
@@ -57,9 +57,8 @@ static const char *check_vary(const json_t *vary)
 	json_t *range;
 	if (!json_is_object(vary))
 		return "vary is an object of members, each with its two bounds";
-	json_object_foreach((json_t *)vary, member, range)
-		if (!is_range(range))
-			return "vary gives each member two numbers, the lower first";
+	json_object_foreach((json_t *)vary, member,
+			    range) if (!is_range(range)) return "vary gives each member two numbers, the lower first";
 	return NULL;
 }
 

@@ -3,7 +3,7 @@
 static const struct {
 	const char *title, *name;
 	double share;
-} columns[] = {{"p50", "p50", 0.5},      {"p90", "p90", 0.9},           {"p99", "p99", 0.99},
+} columns[] = {{"p50", "p50", 0.5},       {"p90", "p90", 0.9},          {"p99", "p99", 0.99},
 	       {"p99.9", "p99_9", 0.999}, {"p99.99", "p99_99", 0.9999}, {"max", "max", 1}};
 
 enum { COLUMNS = sizeof columns / sizeof *columns };
@@ -145,10 +145,10 @@ json_t *report_json(const struct load_settings *settings, const struct mix *mix,
 				 settings->rate, "arrivals", settings->random_arrivals ? "random" : "even", "connections",
 				 settings->connections, "warm_up_s", settings->warm_up_s, "duration_s", settings->duration_s, "timeout_s",
 				 settings->timeout_s, "seed", (json_int_t)settings->seed);
-	return json_pack("{s:o, s:I, s:f, s:I, s:I, s:f, s:f, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I, s:i, s:I, s:f}", "load", load, "asked",
-			 (json_int_t)result->planned, "asked_per_s", (double)result->planned / result->seconds, "answers",
-			 (json_int_t)answers(result), "errors", (json_int_t)errors(result), "good_per_s", goodput(result),
-			 "good_until_s", result->good_seconds_end, "status", statuses_json(result), "error", errors_json(result), "good",
+	return json_pack("{s:o, s:I, s:f, s:I, s:I, s:f, s:f, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I, s:i, s:I, s:f}", "load", load,
+			 "asked", (json_int_t)result->planned, "asked_per_s", (double)result->planned / result->seconds, "answers",
+			 (json_int_t)answers(result), "errors", (json_int_t)errors(result), "good_per_s", goodput(result), "good_until_s",
+			 result->good_seconds_end, "status", statuses_json(result), "error", errors_json(result), "good",
 			 latency_json(result->good), "refused", latency_json(result->refused), "other", latency_json(result->other), "kind",
 			 kinds, "stage", stages, "bytes", (json_int_t)result->bytes, "connections", result->connections, "late",
 			 (json_int_t)result->late, "processor_s", result->processor_s);

@@ -139,6 +139,18 @@ def test_key_is_needed(guarded, keys):
     assert daemon.get("/v1/assets/a").status == 401
 
 
+def test_caches_give_nothing_to_strangers(guarded, keys, daemon):
+    """What may be public without keys is private with them."""
+    target, shown = "/v1/render?output.width=16&output.height=16", bearer(keys.keys["alice"])
+    for address in (target, "/v1/presets", "/v1/optics"):
+        assert daemon.get(address).headers.get_all("Cache-Control") == ["public, max-age=3600"]
+        answer = guarded.get(address, **shown)
+        assert answer.headers.get_all("Cache-Control") == ["private, max-age=3600"], address
+        known = guarded.get(address, If_None_Match=answer.headers["ETag"], **shown)
+        assert known.status == 304 and known.headers.get_all("Cache-Control") == ["private, max-age=3600"]
+    assert guarded.get("/openapi.yaml", **shown).headers["Cache-Control"] == "public, max-age=3600"
+
+
 def test_what_needs_none(guarded):
     for target in ("/", "/openapi.yaml", "/healthz", "/readyz"):
         assert guarded.get(target).status == 200, target

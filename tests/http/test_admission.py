@@ -30,10 +30,11 @@ def render_from(daemon, address, scene, **headers):
 
 
 def send(daemon, scene):
-    """Asks for a picture and leaves the answer where it is."""
+    """Asks for a picture and leaves the answer where it is. There is time: none is refused for being late."""
     body = json.dumps(scene).encode()
     client = socket.create_connection(("127.0.0.1", daemon.port), timeout=ANSWER_SECONDS)
-    client.sendall(b"POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
+    head = b"POST /v1/render HTTP/1.1\r\nHost: x\r\nX-Timeout-Ms: 3600000\r\nContent-Type: application/json\r\n"
+    client.sendall(head + b"Content-Length: %d\r\n\r\n" % len(body) + body)
     return client
 
 

@@ -444,7 +444,7 @@ def test_content_decides_about_tags(daemon, put, picture, read_image):
     location = first.headers["Content-Location"]
     assert "clouds.map=twin" in location and "ground.map=twin" in location and "hash" not in location
     assert first.headers["Cache-Control"] == "no-cache"
-    again = daemon.get(location)
+    again = daemon.get(location, Cache_Control="no-cache")
     assert (again.body, again.headers["ETag"]) == (first.body, first.headers["ETag"])
     assert daemon.get(location, If_None_Match=first.headers["ETag"]).status == 304
     embedded = read_image(first.body)[1].getattribute("stratus:scene")

@@ -3,6 +3,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import time
@@ -152,6 +153,10 @@ def test_supervisor_hears_of_the_life(supervisor, start_daemon):
     daemon = start_daemon()
     assert daemon.get("/readyz").status == 200
     assert "READY=1" in supervisor.recv(4096).decode().splitlines()
+    daemon.process.send_signal(signal.SIGHUP)
+    told = supervisor.recv(4096).decode().splitlines()
+    assert told[0] == "RELOADING=1" and re.fullmatch(r"MONOTONIC_USEC=\d+", told[1])
+    assert supervisor.recv(4096) == b"READY=1"
     assert daemon.stop() == 0
     assert "STOPPING=1" in supervisor.recv(4096).decode().splitlines()
     supervisor.settimeout(0.1)

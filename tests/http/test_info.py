@@ -61,7 +61,7 @@ def test_the_scene_renders_the_file_again(daemon, files, name):
     scene = info(files / name, "--scene")
     assert scene.returncode == 0
     assert json.loads(scene.stdout)["sun"] == {**PLACE, "time": "2024-06-21T12:00:00.250Z"}
-    assert daemon.render(json.loads(scene.stdout)).body == (files / name).read_bytes()
+    assert daemon.render(json.loads(scene.stdout), Cache_Control="no-cache").body == (files / name).read_bytes()
 
 
 def test_text_form(files):

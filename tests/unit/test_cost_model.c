@@ -65,6 +65,13 @@ static struct render_job job_of(const struct scene *scene, double spent_ms)
 	return job;
 }
 
+/* As before it is pushed. */
+static void expect(struct cost_model *model, const struct scene *scene)
+{
+	int ranks[COST_PARTS];
+	cost_model_expect(model, scene, ranks);
+}
+
 static struct scene scene_of(int width, int height)
 {
 	struct scene scene = scene_default();
@@ -86,6 +93,9 @@ static void kinds_are_told_apart(void **state)
 	struct scene small = scene_of(400, 250), large = scene_of(2000, 1000), above = scene_of(1000, 1000), clear = scene_of(1000, 1000);
 	above.camera.position_m[2] = 5000;
 	clear.clouds.type = CLOUD_NONE;
+	const struct scene *known[] = {&small, &above, &clear};
+	for (int i = 0; i < 3; i++)
+		expect(model, known[i]);
 	for (int i = 0; i < 20; i++) { /* 10 ms and 100 for each megapixel; above thrice that, clear a tenth */
 		struct render_job jobs[] = {job_of(&small, 20), job_of(&large, 210), job_of(&above, 330), job_of(&clear, 11)};
 		for (int j = 0; j < 4; j++)
@@ -105,26 +115,56 @@ static void kinds_are_told_apart(void **state)
 	cost_model_destroy(model);
 }
 
+static void render_seed(struct cost_model *model, uint32_t seed, bool reused)
+{
+	struct scene scene = scene_of(1000, 1000);
+	scene.clouds.seed = seed;
+	struct render_job job = job_of(&scene, reused ? 100 : 300);
+	cost_model_expect(model, &scene, job.cost_ranks);
+	job.frame.timing[STAGE_FIELD] = (struct stage_timing){.milliseconds = reused ? 0 : 150, .reused = reused};
+	job.frame.timing[STAGE_RADIOSITY] = (struct stage_timing){.milliseconds = reused ? 0 : 50, .reused = reused};
+	cost_model_learn(model, &job);
+}
+
+static double seed_ms(struct cost_model *model, uint32_t seed)
+{
+	struct scene scene = scene_of(1000, 1000);
+	scene.clouds.seed = seed;
+	return render_ms(model, &scene);
+}
+
 /* What frames share counts once: for the first that asks for it. */
 static void shared_parts_count_once(void **state)
 {
 	(void)state;
 	struct cost_model *model = cost_model_create();
 	struct scene scene = scene_of(1000, 1000);
-	for (int i = 0; i < 10; i++) {
-		scene.clouds.seed = (uint32_t)i;
-		struct render_job job = job_of(&scene, 300);
-		job.frame.timing[STAGE_FIELD] = (struct stage_timing){.milliseconds = 150};
-		job.frame.timing[STAGE_RADIOSITY] = (struct stage_timing){.milliseconds = 50};
-		cost_model_learn(model, &job);
-	}
-	assert_float_equal(render_ms(model, &scene), 100, 1);
+	for (uint32_t seed = 0; seed < 10; seed++)
+		render_seed(model, seed, false);
+	assert_float_equal(seed_ms(model, 9), 100, 1);
+	assert_float_equal(seed_ms(model, 77), 300, 1);
 	scene.clouds.seed = 77;
-	assert_float_equal(render_ms(model, &scene), 300, 1);
-	cost_model_expect(model, &scene); /* one is on its way */
+	expect(model, &scene); /* one is on its way */
 	assert_float_equal(render_ms(model, &scene), 100, 1);
 	scene.camera.azimuth_deg = 10;
 	assert_float_equal(render_ms(model, &scene), 100, 1);
+	cost_model_destroy(model);
+}
+
+/* How many of them the renderer keeps is learned from what it reused. */
+static void the_memory_behind_is_learned(void **state)
+{
+	(void)state;
+	struct cost_model *model = cost_model_create();
+	for (int round = 0; round < 3; round++) /* eight in turn, all kept */
+		for (uint32_t seed = 0; seed < 8; seed++)
+			render_seed(model, seed, round > 0);
+	assert_float_equal(seed_ms(model, 0), 100, 1);
+	for (uint32_t seed = 0; seed < 8; seed++) /* none kept any more */
+		render_seed(model, seed, false);
+	assert_float_equal(seed_ms(model, 0), 300, 1);
+	render_seed(model, 7, true);
+	assert_float_equal(seed_ms(model, 7), 100, 1);
 	cost_model_destroy(model);
 }
 
@@ -152,6 +192,7 @@ static void a_reference_counts_its_paths(void **state)
 	scene.model.name = MODEL_REFERENCE;
 	scene.model.samples = 16;
 	struct render_job job = job_of(&scene, 1000);
+	expect(model, &scene);
 	job.frame.samples = 4; /* cut short: a quarter of the paths */
 	cost_model_learn(model, &job);
 	assert_float_equal(render_ms(model, &scene), 4000, 1);
@@ -181,10 +222,15 @@ static void pace_follows_load(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_line_is_found),         cmocka_unit_test(a_line_from_little),
-		cmocka_unit_test(odd_values_move_little),  cmocka_unit_test(kinds_are_told_apart),
-		cmocka_unit_test(shared_parts_count_once), cmocka_unit_test(droplets_and_encoding),
-		cmocka_unit_test(pace_follows_load),       cmocka_unit_test(a_reference_counts_its_paths),
+		cmocka_unit_test(a_line_is_found),
+		cmocka_unit_test(a_line_from_little),
+		cmocka_unit_test(odd_values_move_little),
+		cmocka_unit_test(kinds_are_told_apart),
+		cmocka_unit_test(shared_parts_count_once),
+		cmocka_unit_test(droplets_and_encoding),
+		cmocka_unit_test(the_memory_behind_is_learned),
+		cmocka_unit_test(pace_follows_load),
+		cmocka_unit_test(a_reference_counts_its_paths),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

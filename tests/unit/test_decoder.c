@@ -19,7 +19,9 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -49,8 +51,10 @@ static bool try_to_escape(int fd, char *error, size_t size)
 		way = "socket";
 	if (fork() >= 0)
 		way = "fork";
-	if (kill(getppid(), 0) == 0)
+	if (kill(getppid(), 0) == 0 || syscall(SYS_tgkill, getppid(), getppid(), 0) == 0)
 		way = "kill";
+	if (prlimit(getppid(), RLIMIT_NOFILE, NULL, &(struct rlimit){0}) == 0)
+		way = "limits of others";
 	if (execl("/bin/true", "true", NULL) == 0 || errno != EPERM)
 		way = "exec";
 	if (unlink("/tmp/nothing") == 0 || errno != EPERM)
@@ -248,6 +252,31 @@ static void test_process_is_replaced(void **state)
 	assert_int_not_equal(child_process(), second);
 }
 
+static void *give_up_soon(void *context)
+{
+	const struct timespec moment = {.tv_nsec = 300000000};
+	(void)context;
+	nanosleep(&moment, NULL);
+	decoder_give_up(decoder);
+	return NULL;
+}
+
+static void test_giving_up(void **state)
+{
+	char error[256];
+	pthread_t other;
+	(void)state;
+	assert_int_equal(examine_within(HONEST, LONG_MS, error), DECODER_OK);
+	const pid_t process = child_process();
+	const double begin = clock_now_ms();
+	assert_int_equal(pthread_create(&other, NULL, give_up_soon, NULL), 0);
+	assert_int_equal(examine_within(SLEEPS, LONG_MS, error), DECODER_LATE);
+	pthread_join(other, NULL);
+	assert_true(clock_now_ms() - begin < 10000);
+	assert_int_equal(kill(process, 0), -1);
+	assert_int_equal(examine_within(HONEST, LONG_MS, error), DECODER_LATE);
+}
+
 static int open_descriptors(void)
 {
 	int count = 0;
@@ -398,6 +427,7 @@ int main(int argc, char **argv)
 		cmocka_unit_test_setup_teardown(test_no_way_out, start, stop),
 		cmocka_unit_test_setup_teardown(test_deadline, start, stop),
 		cmocka_unit_test_setup_teardown(test_process_is_replaced, start, stop),
+		cmocka_unit_test_setup_teardown(test_giving_up, start, stop),
 		cmocka_unit_test_setup_teardown(test_nothing_is_left, start, stop),
 		cmocka_unit_test_setup_teardown(test_from_many_threads, start, stop),
 		cmocka_unit_test_teardown(test_finds_what_is_found_here, stop),

@@ -97,19 +97,27 @@ static int wait_for_end(struct service *service, const sigset_t *signals)
 	return 0;
 }
 
+/* A signal that comes twice within this time is one: terminals and wrappers both pass it on. */
+#define SECOND_SIGNAL_MS 1000.0
+
+static double first_signal_ms;
+
 static void leave_at_once(int number)
 {
 	static const char text[] = "stopped at once by a second signal, accepted work is left\n";
 	(void)number;
+	if (clock_now_ms() < first_signal_ms + SECOND_SIGNAL_MS)
+		return;
 	(void)!write(STDERR_FILENO, text, sizeof text - 1);
 	_exit(EXIT_FAILURE);
 }
 
-/* Whoever asks a second time means it. */
+/* Whoever asks again means it. */
 static void allow_second_signal(const sigset_t *signals)
 {
 	sigset_t ends = *signals;
 	sigdelset(&ends, SIGHUP);
+	first_signal_ms = clock_now_ms();
 	signal(SIGTERM, leave_at_once);
 	signal(SIGINT, leave_at_once);
 	pthread_sigmask(SIG_UNBLOCK, &ends, NULL);

@@ -5,6 +5,8 @@
  * happened.
  *
  *   gl-reset       N: the driver reports a reset, N + 1 questions for it later
+ *   poison         WIDTH, as long as the link exists: the driver reports a reset after each texture of that width
+ *   gl-error       the next question for errors is answered with one
  *   gl-memory      OpenGL has no memory for the next texture
  *   host-memory    BYTES: the next allocation of at least so many fails
  *   hang           S: the next pass holds the thread up for so many seconds
@@ -81,12 +83,17 @@ static void EPOXY_CALLSPEC faulty_glTextureStorage2D(GLuint texture, GLsizei lev
 	else
 		real_glTextureStorage2D(texture, levels, format, width, height);
 	REPLACE(glTextureStorage2D);
+	if (find("poison", &number, false) && width == (GLsizei)number)
+		questions = 0;
 }
 
 static GLenum EPOXY_CALLSPEC faulty_glGetError(void)
 {
+	double number;
 	const bool injected = memory_error;
 	memory_error = false;
+	if (find("gl-error", &number, true))
+		return GL_INVALID_OPERATION;
 	RESTORE(glGetError);
 	const GLenum error = real_glGetError();
 	REPLACE(glGetError);

@@ -114,22 +114,29 @@ def test_a_context_lost_in_the_middle_of_a_picture(faulty):
 
 
 def test_a_scene_that_loses_every_context(faulty):
-    """It is given up, and the next one is rendered."""
-    statuses = []
-    with concurrent.futures.ThreadPoolExecutor(1) as pool:
-        faulty.fail("gl-reset", 2)
-        running = pool.submit(faulty.render, {"sun": {"elevation_deg": 71.5}, "output": {"width": 320, "height": 240}})
-        assert wait_for(lambda: faulty.has_failed("gl-reset"))
-        # Behind the questions of the renderer's start and its golden render it would strike those: wait until they are over.
-        assert wait_for(lambda: faulty.text.count("renderer: up again") >= faulty.text.count("renderer: made anew"))
-        if not running.done():
-            faulty.fail("gl-reset", 0)
-        statuses.append(running.result().status)
-    assert statuses[0] in (200, 500)  # 200: it was through before the second one
-    if not faulty.has_failed("gl-reset"):
-        faulty.heal("gl-reset")
+    """It is given up after the second time, and others go on."""
+    resets = faulty.resets("guilty")
+    faulty.fail("poison", 333)
+    answer = faulty.render({"output": {"width": 333, "height": 48}})
+    assert answer.status == 500
+    assert answer.json["type"] == "urn:stratus:problem:render-failed"
+    faulty.heal("poison")
     assert wait_for(faulty.is_ready)
-    assert faulty.render({"output": SMALL}).status == 200
+    assert faulty.resets("guilty") == resets + 2
+    assert faulty.render({"output": {"width": 333, "height": 48}}).status == 200
+
+
+def test_failures_on_end(faulty):
+    """Of renders that fail without the driver's saying why each is answered so, and after the third the renderer is made anew."""
+    scene = {"clouds": {"seed": 90}, "output": SMALL}
+    faulty.render(scene)
+    for turn in range(3):
+        assert faulty.resets("failures") == 0
+        faulty.fail("gl-error")
+        assert faulty.render({**scene, "camera": {"azimuth_deg": 10 * turn}}).status == 500
+    assert wait_for(lambda: faulty.resets("failures") == 1)
+    assert wait_for(faulty.is_ready)
+    assert faulty.render(scene, Cache_Control="no-cache").status == 200
 
 
 def test_many_requests_over_a_reset(faulty):
@@ -334,7 +341,9 @@ def test_a_second_signal_ends_at_once(start_faulty):
         running = busy(daemon, pool, seconds=60)
         daemon.process.send_signal(signal.SIGTERM)
         assert wait_for(lambda: "SIGTERM: finishing accepted work" in daemon.text)
-        time.sleep(0.2)
+        daemon.process.send_signal(signal.SIGTERM)
+        time.sleep(1.2)
+        assert daemon.process.poll() is None  # a signal that comes twice is one
         daemon.process.send_signal(signal.SIGTERM)
         assert daemon.process.wait(timeout=20) == 1
         for one in running:

@@ -93,6 +93,18 @@ static bool is_over(struct render_job *job, void *context)
 	return !job->pending && render_job_is_over(job);
 }
 
+/* Images that a device made which renders wrongly are not kept: from the failed proof until it is in order again. */
+static void drop_wrong(struct service *service)
+{
+	const bool in_order = render_thread_state(service->render_thread) == RENDER_THREAD_READY;
+	const unsigned long wrong = render_thread_care(service->render_thread).golden_failed;
+	if (wrong == service->wrong_seen)
+		return;
+	image_cache_clear(service->finished);
+	if (in_order)
+		service->wrong_seen = wrong;
+}
+
 /* Renders that wait and that nobody waits for any more, or not in time, make room at once. */
 static void drop_over(void *context)
 {
@@ -102,6 +114,7 @@ static void drop_over(void *context)
 	for (struct render_job *job; (job = render_queue_remove(service->queue, is_over, NULL));)
 		job->finished(job);
 	preparation_drop_over(service->preparation);
+	drop_wrong(service);
 }
 
 struct service *service_create(const struct config *config)

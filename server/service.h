@@ -57,6 +57,7 @@ struct service {
 	unsigned port;
 	int listening_socket; /* taken from libmicrohttpd while stopping; else negative */
 
+	unsigned long wrong_seen;    /* golden renders that failed; of the connections' thread */
 	_Atomic size_t in_flight;    /* requests read to their end and not answered to theirs */
 	_Atomic size_t memory_bytes; /* promised to pictures in work (admission.h) */
 	_Atomic size_t suspended;    /* those of them that others work for */

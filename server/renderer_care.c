@@ -118,7 +118,10 @@ static double growth(const struct renderer_care *care)
 static bool has_grown(const struct renderer_care *care)
 {
 	const double limit = (double)care->config->recycle_mb * (1 << 20);
-	return growth(care) > limit && malloc_trim(0) && growth(care) > limit;
+	if (growth(care) <= limit)
+		return false;
+	malloc_trim(0);
+	return growth(care) > limit;
 }
 
 static bool is_to_be_recycled(struct renderer_care *care, bool idle)

@@ -288,7 +288,8 @@ static void *ask_many(void *argument)
 static void run_all(size_t cache_bytes, struct table *table)
 {
 	pthread_t askers[ASKERS], renderer;
-	*table = (struct table){.cache = image_cache_create(cache_bytes), .queue = render_queue_create(2)};
+	*table = (struct table){.cache = image_cache_create(cache_bytes),
+				.queue = render_queue_create(&(struct render_queue_limits){.jobs = 2, .pixels = 1e9})};
 	table->flights = flights_create(table->cache);
 	assert_int_equal(pthread_create(&renderer, NULL, render_all, table), 0);
 	for (int i = 0; i < ASKERS; i++)

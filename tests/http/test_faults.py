@@ -72,6 +72,19 @@ def faulty(tmp_path_factory):
     assert status == 0
 
 
+@pytest.fixture(scope="module", autouse=True)
+def doomed(tmp_path_factory):
+    """One whose device never comes back: it gives up after half a minute, while the other tests run. (daemon, running requests)"""
+    daemon = FaultyDaemon(tmp_path_factory.mktemp("doomed"))
+    pool = concurrent.futures.ThreadPoolExecutor(2)
+    daemon.fail("gone")
+    daemon.fail("gl-reset", 0)
+    yield daemon, [pool.submit(daemon.render, {"clouds": {"seed": i}, "output": SMALL}) for i in range(2)]
+    daemon.stop()
+    pool.shutdown()
+    daemon.assert_clean()
+
+
 # --- the delivered program ---------------------------------------------------------------------------------------------------------
 
 
@@ -253,14 +266,12 @@ def test_start_on_a_device_that_draws_nothing(tmp_path):
 def test_start_with_a_shader_that_does_not_compile(tmp_path):
     """The log names file and line."""
     shutil.copytree(ROOT / "shaders", tmp_path / "shaders")
-    path = tmp_path / "shaders" / "lib" / "phase.glsl"
-    if not path.exists():
-        path = sorted((tmp_path / "shaders" / "lib").glob("sky*.glsl"))[0]
+    path = tmp_path / "shaders" / "lib" / "atmosphere.glsl"
     lines = path.read_text().split("\n")
     lines.insert(20, "this is no GLSL;")
     path.write_text("\n".join(lines))
     error = start_in_vain("stratusd", "--shader-dir", tmp_path / "shaders", folder=tmp_path)
-    assert re.search(rf" error +gl: shaders/lib/{path.name}:\d+: .*error", error), error
+    assert re.search(r" error +gl: shaders/lib/atmosphere.glsl:21: .*error", error), error
     assert "renderer: cannot start" in error
 
 
@@ -365,3 +376,17 @@ def test_a_reset_while_draining(start_faulty):
         assert [r.result().status for r in running] == [200] * 3
     assert daemon.process.wait(timeout=60) == 0
     assert daemon.has_failed("gl-reset")
+
+
+# --- a device that never comes back ----------------------------------------------------------------------------------------------------
+
+
+def test_a_device_that_is_gone_for_good(doomed):
+    """The tries are bounded; who waited is refused, and the process ends with a status that has it started again."""
+    daemon, running = doomed
+    answers = [r.result() for r in running]
+    assert [a.status for a in answers] == [503] * 2
+    assert {a.json["type"] for a in answers} == {"urn:stratus:problem:renderer-unavailable"}
+    assert all(int(a.headers["Retry-After"]) >= 1 for a in answers)
+    assert daemon.process.wait(timeout=60) == 3
+    assert "8 of 8 tries to bring it up again failed" in daemon.text

@@ -6,6 +6,7 @@
 # make gallery   draws the pictures of docs/gallery
 # make fuzz     throws bytes at every reader of what strangers send, FUZZ_SECONDS (600) each; FUZZ="name name" takes these alone
 # make load     offers a daemon half of what it can do up to four times as much; three minutes
+# make golden    writes what the golden render is now into renderer/golden_values.inc: after a change of what pictures look like
 # make install   puts programs, manual and systemd unit below PREFIX (/usr/local), all below DESTDIR; make uninstall takes them away
 # make image     builds the container image and renders a picture with it
 # SAN=address,undefined before any of them builds with sanitizers, in a folder of its own.
@@ -57,7 +58,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel man install uninstall image run test fuzz replays load demo gallery validate judge unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall image run test fuzz replays load demo gallery validate judge golden unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -83,6 +84,9 @@ $(B)/libserver.a: $(call obj,$(SERVER_SRC)) $(B)/gen/resources.o
 
 $(B)/stratusd: $(call obj,server/main.c) $(B)/libserver.a $(B)/librenderer.a
 	$(CC) $(LDFLAGS) $^ -o $@ $(SERVER_LIBS) $(RENDERER_LIBS)
+# For tests: the same with a GPU, a driver and a memory that can be told to fail (tests/faults/faults.c).
+$(B)/stratusd-faulty: $(call obj,server/main.c tests/faults/faults.c) $(B)/libserver.a $(B)/librenderer.a
+	$(CC) $(LDFLAGS) -Wl,--wrap=config_parse,--wrap=malloc $^ -o $@ $(SERVER_LIBS) $(RENDERER_LIBS)
 $(B)/stratus: $(call obj,$(CLIENT_SRC))
 	$(CC) $(LDFLAGS) $^ -o $@ $(CLIENT_LIBS) -lm
 $(B)/render-bench: $(call obj,renderer/programs/bench.c) $(B)/librenderer.a
@@ -249,7 +253,11 @@ judge: packages
 	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
 	@scripts/judge.sh $(B)
 
-unit: $(UNIT)
+golden: packages
+	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
+	$(B)/render-bench -g renderer/golden_values.inc
+
+unit: $(UNIT) $(B)/stratusd-faulty
 
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')

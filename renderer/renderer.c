@@ -1,6 +1,7 @@
 #include "renderer/renderer.h"
 
 #include "renderer/gl/context.h"
+#include "renderer/gl/memory.h"
 #include "renderer/gl/readback.h"
 #include "renderer/gl/timer.h"
 #include "renderer/log.h"
@@ -626,7 +627,7 @@ static enum render_result run_stages(struct job *job)
 	return RENDER_OK;
 }
 
-static void drop_pending(struct render_pending **pending)
+void renderer_drop_pending(struct render_pending **pending)
 {
 	if (*pending)
 		reference_work_destroy((*pending)->work);
@@ -640,7 +641,7 @@ static void settle_pending(struct job *job, enum render_result result)
 	if (result == RENDER_UNFINISHED)
 		memcpy((*job->pending)->spent, job->frame->timing, sizeof job->frame->timing);
 	else
-		drop_pending(job->pending);
+		renderer_drop_pending(job->pending);
 }
 
 enum render_result renderer_render(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled, void *context,
@@ -681,7 +682,7 @@ enum render_result renderer_start(struct renderer *renderer, const struct scene 
 	if (scene->output.width > renderer->info.max_texture_size || scene->output.height > renderer->info.max_texture_size) {
 		log_error("renderer: %d x %d is more than this device's %d", scene->output.width, scene->output.height,
 			  renderer->info.max_texture_size);
-		drop_pending(pending);
+		renderer_drop_pending(pending);
 		return RENDER_OUT_OF_MEMORY;
 	}
 	cache_begin_frame(renderer->context.cache);
@@ -707,6 +708,21 @@ enum render_result renderer_start(struct renderer *renderer, const struct scene 
 		frame_finish(frame);
 	}
 	return result;
+}
+
+/* --- the device ------------------------------------------------------------------------------------------------------------------- */
+
+_Static_assert((int)RENDERER_LOST_GUILTY == (int)GL_LOST_GUILTY && (int)RENDERER_LOST_UNKNOWN == (int)GL_LOST_UNKNOWN, "one list");
+
+enum renderer_loss renderer_look(void)
+{
+	gl_was_reset("looked for");
+	return (enum renderer_loss)gl_lost();
+}
+
+double renderer_free_memory(void)
+{
+	return gl_free_memory();
 }
 
 /* --- a picture's arrival ------------------------------------------------------------------------------------------------------------ */

@@ -109,6 +109,19 @@ struct render_pending;
 enum render_result renderer_render_some(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled,
 					renderer_cancelled *paused, void *context, struct render_pending **pending, struct frame *frame);
 
+/* Forgets a picture on its way, which begins anew with the next call. Takes one that is NULL. */
+void renderer_drop_pending(struct render_pending **pending);
+
+/* Why a context is to be made anew. */
+enum renderer_loss { RENDERER_NOT_LOST, RENDERER_LOST_GUILTY, RENDERER_LOST_INNOCENT, RENDERER_LOST_UNKNOWN };
+
+/* Looks whether the OpenGL context of the calling thread's renderer was lost: then every call fails, and another renderer is wanted, which
+ * may be created after renderer_destroy. What was on its way is lost with it. By whose fault: as far as the driver knows. */
+enum renderer_loss renderer_look(void);
+
+/* Memory of the device that nobody uses, bytes; negative where the driver does not say. Of the calling thread's renderer. */
+double renderer_free_memory(void);
+
 /* As renderer_render_some, without waiting for the GPU at the end: on RENDER_OK the picture may still be on its way, frame->transfer, while
  * the next one is begun. The frame's timing, but for the optics, is that of its arrival. */
 enum render_result renderer_start(struct renderer *renderer, const struct scene *scene, renderer_cancelled *cancelled,

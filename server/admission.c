@@ -146,6 +146,7 @@ void admission_price(const struct request *request, struct render_job *job)
 	struct service *service = request->service;
 	const double predicted_ms = cost_model_predict(service->costs, job->scene, job->directions, false).render_ms;
 	job->client = request->client;
+	job->device = render_thread_info(service->render_thread);                           /* which the entity tag names */
 	job->predicted_ms = fmin(predicted_ms, fmax(job->deadline_ms - clock_now_ms(), 0)); /* then it is dropped */
 	if (!job->directions)
 		cost_model_expect(service->costs, job->scene, job->cost_ranks);

@@ -11,7 +11,9 @@
 bool call_tag(const struct service *service, const char *call, char *question, char tag[static ENTITY_TAG_SIZE])
 {
 	struct text tagged = {0};
-	text_printf(&tagged, "%s|%s|%s", call, question ? question : "", service->pixel_version);
+	const struct renderer_info *device = render_thread_info(service->render_thread);
+	text_printf(&tagged, "%s|%s|%s|%s|%s|%s|%d", call, question ? question : "", service->pixel_version, device->vendor,
+		    device->renderer, device->version, (int)device->pass_kind);
 	const bool good = question && !tagged.failed;
 	if (good)
 		entity_tag_of(tagged.data, tagged.length, tag);
@@ -59,7 +61,8 @@ enum call_outcome call_reason_to_stop(const struct request *request, double dead
 static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
 					[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
 					[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
-					[RENDER_OUTCOME_FAILED] = ENDED_FAILED};
+					[RENDER_OUTCOME_FAILED] = ENDED_FAILED,
+					[RENDER_OUTCOME_UNAVAILABLE] = ENDED_FAILED};
 
 void call_end_wait(struct request *request, enum render_outcome outcome)
 {
@@ -124,6 +127,9 @@ enum MHD_Result call_send_render_failure(struct request *request, enum render_ou
 		return call_send_failure(request, CALL_ABANDONED, what);
 	case RENDER_OUTCOME_NO_MEMORY:
 		return response_send_new_problem(request, PROBLEM_NO_MEMORY, "The device has no memory for %s now.", size);
+	case RENDER_OUTCOME_UNAVAILABLE:
+		return response_send_new_problem(request, PROBLEM_UNAVAILABLE, "%s could not be made: the device is gone, or another one.",
+						 what);
 	case RENDER_OUTCOME_FAILED:
 	case RENDER_OUTCOME_OK:
 		break;

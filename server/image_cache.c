@@ -134,6 +134,14 @@ static struct finished_image *make_room(struct image_cache *cache, size_t bytes)
 	return dropped;
 }
 
+static void release_chain(struct finished_image *dropped)
+{
+	for (struct finished_image *next; dropped; dropped = next) {
+		next = dropped->chained;
+		finished_image_release(dropped);
+	}
+}
+
 /* --- from outside ------------------------------------------------------------------------------------------------------------------- */
 
 struct finished_image *image_cache_find(struct image_cache *cache, const char *tag)
@@ -169,11 +177,16 @@ bool image_cache_keep(struct image_cache *cache, struct finished_image *image)
 		cache->counts.images++;
 	}
 	pthread_mutex_unlock(&cache->mutex);
-	for (struct finished_image *next; dropped; dropped = next) {
-		next = dropped->chained;
-		finished_image_release(dropped);
-	}
+	release_chain(dropped);
 	return true;
+}
+
+void image_cache_clear(struct image_cache *cache)
+{
+	pthread_mutex_lock(&cache->mutex);
+	struct finished_image *dropped = make_room(cache, cache->counts.bound);
+	pthread_mutex_unlock(&cache->mutex);
+	release_chain(dropped);
 }
 
 struct image_cache_counts image_cache_counts(struct image_cache *cache)

@@ -40,6 +40,9 @@ struct finished_image *image_cache_find(struct image_cache *cache, const char *t
 /* Holds the image as long as there is room. false when it is larger than all the room there is. */
 bool image_cache_keep(struct image_cache *cache, struct finished_image *image);
 
+/* Drops all images, which counts as eviction. */
+void image_cache_clear(struct image_cache *cache);
+
 struct image_cache_counts {
 	size_t images, bytes, bound;
 	uint64_t evicted; /* for want of room, since the cache was made */

@@ -1,11 +1,11 @@
 /* stratusd: settings, signals, and the life of the service. */
 #include "renderer/log.h"
+#include "server/clock.h"
 #include "server/config_check.h"
 #include "server/decoder_process.h"
 #include "server/service.h"
 #include "server/supervisor.h"
 
-#include <errno.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +13,10 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { EXIT_BAD_CONFIG = 2 };
+enum { EXIT_BAD_CONFIG = 2, EXIT_NO_RENDERER = 3 };
+
+/* So often the main thread looks whether the renderer hangs. */
+enum { LOOK_MS = 200 };
 
 /* The signals that end the daemon, and the one that has it read keys and certificate again: blocked in all threads and fetched by the main
  * thread. */
@@ -62,18 +65,71 @@ static void reload(struct service *service)
 	supervisor_tell("READY=1");
 }
 
-/* Serves until a signal ends it. The supervisor hears of the daemon as long as a restart would not help; then it makes that restart. */
-static int wait_for_signal(struct service *service, const sigset_t *signals)
+/* The supervisor hears whether renders are taken, and of the daemon's life as long as a restart would not help. */
+static void tell(enum service_state state, double *told_ms)
 {
+	static enum service_state before = SERVICE_READY;
 	const int interval_ms = supervisor_interval_ms();
-	const struct timespec interval = {.tv_sec = interval_ms / 1000, .tv_nsec = interval_ms % 1000 * 1000000L};
-	int number;
-	while ((number = interval_ms ? sigtimedwait(signals, NULL, &interval) : sigwaitinfo(signals, NULL)) < 0 || number == SIGHUP)
+	if (interval_ms && clock_now_ms() >= *told_ms + interval_ms) {
+		supervisor_tell("WATCHDOG=1");
+		*told_ms = clock_now_ms();
+	}
+	if (state != before)
+		supervisor_tell(state == SERVICE_RECOVERING ? "STATUS=The renderer is made anew." : "STATUS=Renders are taken.");
+	before = state;
+}
+
+/* Serves until a signal ends it, whose number it returns, or the renderer is gone: 0. */
+static int wait_for_end(struct service *service, const sigset_t *signals)
+{
+	double told_ms = clock_now_ms();
+	const int interval_ms = supervisor_interval_ms();
+	const struct timespec interval = {.tv_nsec = (interval_ms && interval_ms < LOOK_MS ? interval_ms : LOOK_MS) * 1000000L};
+	enum service_state state;
+	while ((state = service_state(service)) != SERVICE_FAILED) {
+		tell(state, &told_ms);
+		const int number = sigtimedwait(signals, NULL, &interval);
 		if (number == SIGHUP)
 			reload(service);
-		else if (errno == EAGAIN && service_state(service) != SERVICE_FAILED)
-			supervisor_tell("WATCHDOG=1");
-	return number;
+		else if (number > 0)
+			return number;
+	}
+	return 0;
+}
+
+/* A signal that comes twice within this time is one: terminals and wrappers both pass it on. */
+#define SECOND_SIGNAL_MS 1000.0
+
+static double first_signal_ms;
+
+static void leave_at_once(int number)
+{
+	static const char text[] = "stopped at once by a second signal, accepted work is left\n";
+	(void)number;
+	if (clock_now_ms() < first_signal_ms + SECOND_SIGNAL_MS)
+		return;
+	(void)!write(STDERR_FILENO, text, sizeof text - 1);
+	_exit(EXIT_FAILURE);
+}
+
+/* Whoever asks again means it. */
+static void allow_second_signal(const sigset_t *signals)
+{
+	sigset_t ends = *signals;
+	sigdelset(&ends, SIGHUP);
+	first_signal_ms = clock_now_ms();
+	signal(SIGTERM, leave_at_once);
+	signal(SIGINT, leave_at_once);
+	pthread_sigmask(SIG_UNBLOCK, &ends, NULL);
+}
+
+/* Nothing can be waited for that hangs in a driver: the process ends where it is, and a supervisor starts another one. */
+static void abandon(struct service *service)
+{
+	log_error("the renderer hangs or is gone: ending, to be started anew");
+	supervisor_tell("STOPPING=1\nSTATUS=The renderer hangs or is gone.");
+	service_abandon(service);
+	_exit(EXIT_NO_RENDERER);
 }
 
 static void set_log(const struct config *config)
@@ -108,7 +164,10 @@ int main(int argc, char **argv)
 		printf("stratusd listening on %s://%s:%u\n", config.tls_cert ? "https" : "http", service->host, service->port);
 		fflush(stdout);
 		supervisor_tell("READY=1\nSTATUS=Renders are taken.");
-		int number = wait_for_signal(service, &signals);
+		const int number = wait_for_end(service, &signals);
+		if (!number)
+			abandon(service);
+		allow_second_signal(&signals);
 		supervisor_tell("STOPPING=1\nSTATUS=Finishing accepted work.");
 		log_info("%s: finishing accepted work", number == SIGINT ? "SIGINT" : "SIGTERM");
 	}

@@ -1,6 +1,7 @@
 #include "server/metrics.h"
 
 #include "renderer/log.h"
+#include "server/process_memory.h"
 #include "server/text.h"
 
 #include <dirent.h>
@@ -16,7 +17,7 @@ static const char *const route_names[ROUTE_COUNT] = {"/v1/render",    "/v1/compa
 						     "/v1/sun",       "/v1/assets",  "/v1/assets/NAME", "/v1/presets", "/",
 						     "/openapi.yaml", "/healthz",    "/readyz",         "/metrics",    "other"};
 static const char *const rejection_names[REJECTION_COUNT] = {"full",        "pixels",   "predicted_late", "memory",
-							     "connections", "starting", "shutting_down"};
+							     "connections", "starting", "shutting_down",  "unavailable"};
 static const char *const image_names[IMAGE_SOURCE_COUNT] = {
 	[IMAGE_FROM_CACHE] = "hit", [IMAGE_SHARED] = "shared", [IMAGE_MISSED] = "miss", [IMAGE_BYPASSED] = "bypass"};
 static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
@@ -328,6 +329,18 @@ static void write_admission(struct text *text, const struct metrics *metrics, co
 	text_printf(text, "stratus_connections_dropped_total{reason=\"slow\"} %llu\n", now->connections.slow);
 }
 
+static void write_care(struct text *text, const struct care_counts *care)
+{
+	write_family(text, "gl_context_resets", "counter", "Times that the renderer was made anew, by reason.");
+	for (int i = CARE_NONE + 1; i < CARE_REASON_COUNT; i++)
+		text_printf(text, "stratus_gl_context_resets_total{reason=\"%s\"} %lu\n", care_reason_names[i], care->resets[i]);
+	write_family(text, "renders_repeated", "counter", "Renders begun again, since the context was lost in the middle.");
+	text_printf(text, "stratus_renders_repeated_total %lu\n", care->repeated);
+	write_family(text, "golden_renders", "counter", "Golden renders, by what came of them.");
+	text_printf(text, "stratus_golden_renders_total{result=\"passed\"} %lu\n", care->golden_passed);
+	text_printf(text, "stratus_golden_renders_total{result=\"failed\"} %lu\n", care->golden_failed);
+}
+
 static void write_tracings(struct text *text, const struct metrics *metrics, const struct metrics_now *now)
 {
 	write_family(text, "tracings_waiting", "gauge", "Photon tracings waiting.");
@@ -482,15 +495,8 @@ static void write_process(struct text *text, const struct metrics *metrics)
 		write_family(text, "process_max_fds", "gauge", "File descriptors that may be open.");
 		text_printf(text, "stratus_process_max_fds %llu\n", (unsigned long long)limit.rlim_cur);
 	}
-	unsigned long total = 0, resident = 0;
-	FILE *file = fopen("/proc/self/statm", "re");
-	if (!file)
-		return;
-	if (fscanf(file, "%lu %lu", &total, &resident) == 2) {
-		write_family(text, "process_resident_memory_bytes", "gauge", "Resident memory of the process.");
-		text_printf(text, "stratus_process_resident_memory_bytes %lu\n", resident * (unsigned long)sysconf(_SC_PAGESIZE));
-	}
-	fclose(file);
+	write_family(text, "process_resident_memory_bytes", "gauge", "Resident memory of the process.");
+	text_printf(text, "stratus_process_resident_memory_bytes %.0f\n", process_resident_bytes());
 }
 
 char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
@@ -508,6 +514,7 @@ char *metrics_format(struct metrics *metrics, const struct metrics_now *now)
 	write_stages(&text, copy);
 	write_queue(&text, copy, now);
 	write_admission(&text, copy, now);
+	write_care(&text, &now->care);
 	write_images(&text, copy, &now->finished);
 	write_tracings(&text, copy, now);
 	write_droplets(&text, &now->droplets);

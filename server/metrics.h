@@ -12,6 +12,7 @@
 #include "server/image_cache.h"
 #include "server/problem.h"
 #include "server/render_queue.h"
+#include "server/renderer_care.h"
 #include "server/server_timing.h"
 
 #include <time.h>
@@ -43,6 +44,7 @@ enum metrics_rejection {
 	REJECTED_CONNECTIONS,
 	REJECTED_STARTING,
 	REJECTED_SHUTTING_DOWN,
+	REJECTED_UNAVAILABLE,
 	REJECTION_COUNT
 };
 /* Where the image of an answer came from. */
@@ -82,6 +84,7 @@ struct metrics_now {
 	size_t queue_depth, queue_limit, requests_in_flight;
 	double queue_pixels, queue_pixels_limit, backlog_ms;
 	struct connections_counts connections;
+	struct care_counts care;
 	size_t connections_limit, memory_bytes, memory_limit;
 	size_t tracings_waiting, tracings_limit;
 	struct droplet_store_counts droplets;

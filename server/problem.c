@@ -44,6 +44,7 @@ static const struct kind kinds[PROBLEM_KIND_COUNT] = {
 	[PROBLEM_STARTING] = {503, "starting", "Not ready yet"},
 	[PROBLEM_SHUTTING_DOWN] = {503, "shutting-down", "Shutting down"},
 	[PROBLEM_UPLOADS_FULL] = {503, "queue-full", "Too much to do"},
+	[PROBLEM_UNAVAILABLE] = {503, "renderer-unavailable", "No renderer for now"},
 	[PROBLEM_DEADLINE] = {504, "deadline-passed", "The deadline passed"},
 	[PROBLEM_STORAGE_FULL] = {507, "storage-full", "No room for this asset"},
 };

@@ -43,7 +43,11 @@ struct render_queue *render_queue_create(const struct render_queue_limits *limit
 		return NULL;
 	}
 	pthread_mutex_init(&queue->mutex, NULL);
-	pthread_cond_init(&queue->changed, NULL);
+	pthread_condattr_t monotonic;
+	pthread_condattr_init(&monotonic);
+	pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+	pthread_cond_init(&queue->changed, &monotonic);
+	pthread_condattr_destroy(&monotonic);
 	queue->order = order;
 	queue->limits = *limits;
 	return queue;
@@ -166,6 +170,19 @@ struct render_job *render_queue_pop(struct render_queue *queue)
 	while (!queue->depth && !queue->closed)
 		pthread_cond_wait(&queue->changed, &queue->mutex);
 	struct render_job *job = take(queue, first(queue, NULL, NULL));
+	pthread_mutex_unlock(&queue->mutex);
+	return job;
+}
+
+struct render_job *render_queue_pop_within(struct render_queue *queue, double milliseconds, bool *closed)
+{
+	const double until_ms = clock_now_ms() + milliseconds;
+	const struct timespec until = {.tv_sec = (time_t)(until_ms * 1e-3), .tv_nsec = (long)(fmod(until_ms, 1e3) * 1e6)};
+	pthread_mutex_lock(&queue->mutex);
+	while (!queue->depth && !queue->closed && pthread_cond_timedwait(&queue->changed, &queue->mutex, &until) == 0)
+		;
+	struct render_job *job = take(queue, first(queue, NULL, NULL));
+	*closed = !job && queue->closed;
 	pthread_mutex_unlock(&queue->mutex);
 	return job;
 }

@@ -14,7 +14,8 @@ enum render_outcome {
 	RENDER_OUTCOME_EXPIRED, /* the deadline passed, in the queue or between passes */
 	RENDER_OUTCOME_ABANDONED /* nobody waits for it any more */,
 	RENDER_OUTCOME_NO_MEMORY, /* this scene is too large for the device as it is loaded; others may do */
-	RENDER_OUTCOME_FAILED
+	RENDER_OUTCOME_FAILED,
+	RENDER_OUTCOME_UNAVAILABLE /* there is no renderer any more, or another device than before */
 };
 
 /* Why a queue did not take a job. */
@@ -54,8 +55,10 @@ struct render_job {
 	enum render_outcome outcome;
 	enum render_refusal refusal; /* set by render_queue_push */
 	enum render_phase phase;
-	double spent_ms;  /* of the render thread's time */
-	double waited_ms; /* in queues */
+	const struct renderer_info *device; /* that the answer speaks of; NULL: any */
+	int interruptions;                  /* by a context that was lost while it was rendered */
+	double spent_ms;                    /* of the render thread's time */
+	double waited_ms;                   /* in queues */
 	struct frame frame;
 	struct sky_light light; /* likewise */
 
@@ -85,6 +88,9 @@ void render_queue_pass(struct render_queue *queue, struct render_job *job);
 
 /* Waits for a job. NULL once the queue is closed and empty. render_queue_settle must follow. */
 struct render_job *render_queue_pop(struct render_queue *queue);
+
+/* Likewise; NULL also when none has come within so long, *closed says which. */
+struct render_job *render_queue_pop_within(struct render_queue *queue, double milliseconds, bool *closed);
 
 /* The next job that is wanted, or NULL; never waits. `wanted` must not use the queue. render_queue_settle must follow. */
 typedef bool render_job_wanted(struct render_job *job, void *context);

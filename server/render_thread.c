@@ -14,6 +14,12 @@
 /* So many failures on end are taken for a dead context rather than for bad luck. */
 enum { FAILURES_MAX = 3 };
 
+/* A scene that has the driver reset itself so often is not tried again. */
+enum { INTERRUPTIONS_MAX = 2 };
+
+/* So often an idle thread looks after the renderer. */
+#define CARE_MS 250.0
+
 struct render_thread {
 	const struct config *config;
 	struct render_queue *queue;
@@ -21,11 +27,12 @@ struct render_thread {
 	pthread_t thread;
 	struct kernel *kernel;
 	struct droplet_store *droplets;
-	struct renderer *renderer;
-	_Atomic int state; /* enum render_thread_state; kernel, droplets and renderer are set before it says READY */
-	_Atomic double busy_since_ms;
-	int failures;     /* on end */
-	bool has_pending; /* a reference in the queue is on its way */
+	struct renderer_care *care;
+	_Atomic int state; /* enum render_thread_state; kernel, droplets and care are set before it says READY */
+	struct heartbeat heartbeat;
+	int failures;               /* on end */
+	struct render_job *pending; /* a reference in the queue that is on its way, or NULL */
+	double idle_since_ms;
 	struct transfers transfers;
 };
 
@@ -47,7 +54,7 @@ static bool is_cancelled(void *context)
 {
 	const struct running_job *running = context;
 	end_arrived(running->thread, 0);
-	running->thread->busy_since_ms = clock_now_ms();
+	heartbeat_beat(&running->thread->heartbeat);
 	return render_job_is_over(running->job);
 }
 
@@ -69,8 +76,10 @@ static enum render_result ask_renderer(struct render_thread *thread, struct rend
 {
 	struct running_job running = {thread, job, clock_now_ms() + RENDER_TURN_MS};
 	if (job->directions)
-		return renderer_sky_light(thread->renderer, job->scene, job->directions, is_cancelled, &running, &job->light);
-	return renderer_start(thread->renderer, job->scene, is_cancelled, is_paused, &running, &job->pending, &job->frame);
+		return renderer_sky_light(renderer_care_renderer(thread->care), job->scene, job->directions, is_cancelled, &running,
+					  &job->light);
+	return renderer_start(renderer_care_renderer(thread->care), job->scene, is_cancelled, is_paused, &running, &job->pending,
+			      &job->frame);
 }
 
 static enum render_outcome outcome_of(struct render_thread *thread, struct render_job *job, enum render_result result)
@@ -81,11 +90,16 @@ static enum render_outcome outcome_of(struct render_thread *thread, struct rende
 	if (result == RENDER_OUT_OF_MEMORY)
 		return RENDER_OUTCOME_NO_MEMORY;
 	thread->failures = result == RENDER_OK ? 0 : thread->failures + 1;
-	if (thread->failures >= FAILURES_MAX)
-		thread->state = RENDER_THREAD_FAILED;
-	else if (result == RENDER_OK)
-		thread->state = RENDER_THREAD_READY;
 	return result == RENDER_OK ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
+}
+
+/* A job that a lost context interrupted goes back to the queue. */
+static bool is_interrupted(struct render_thread *thread, struct render_job *job, enum render_result result)
+{
+	if (result != RENDER_FAILED || renderer_look() == RENDERER_NOT_LOST || ++job->interruptions >= INTERRUPTIONS_MAX)
+		return false;
+	renderer_care_count_repeat(thread->care);
+	return true;
 }
 
 /* What a turn took is its client's to pay. */
@@ -95,11 +109,16 @@ static void settle(struct render_thread *thread, struct render_job *job, double 
 	render_queue_settle(thread->queue, job, took_ms);
 }
 
+/* Ends a job, or has it done again. */
 static void end_job(struct render_thread *thread, struct render_job *job, enum render_result result, double took_ms)
 {
 	settle(thread, job, took_ms);
+	if (is_interrupted(thread, job, result)) {
+		render_queue_pass(thread->queue, job);
+		return;
+	}
 	job->outcome = outcome_of(thread, job, result);
-	if (job->outcome == RENDER_OUTCOME_OK)
+	if (job->outcome == RENDER_OUTCOME_OK && job->interruptions == 0)
 		cost_model_learn(thread->costs, job);
 	job->finished(job);
 }
@@ -109,7 +128,8 @@ static void end_arrived(struct render_thread *thread, double milliseconds)
 {
 	enum render_result result;
 	double took_ms;
-	for (struct render_job *job; (job = transfers_take(&thread->transfers, thread->renderer, milliseconds, &result, &took_ms));
+	for (struct render_job *job;
+	     (job = transfers_take(&thread->transfers, renderer_care_renderer(thread->care), milliseconds, &result, &took_ms));
 	     milliseconds = 0)
 		end_job(thread, job, result, took_ms);
 }
@@ -119,7 +139,82 @@ static enum render_result run_job(struct render_thread *thread, struct render_jo
 {
 	if (!job->pending && render_job_is_over(job))
 		return RENDER_CANCELLED;
-	return ask_renderer(thread, job);
+	if (!job->device || job->device == renderer_care_info(thread->care))
+		return ask_renderer(thread, job);
+	log_warning("a picture that was promised of another device is refused");
+	renderer_drop_pending(&job->pending);
+	job->outcome = RENDER_OUTCOME_UNAVAILABLE;
+	return RENDER_CANCELLED;
+}
+
+/* --- the renderer's troubles ------------------------------------------------------------------------------------------------------- */
+
+/* What was on its way is lost with the renderer: a reference begins again. */
+static void forget_pending(struct render_thread *thread)
+{
+	struct render_job *job = thread->pending;
+	thread->pending = NULL;
+	if (!job)
+		return;
+	renderer_care_count_repeat(thread->care);
+	renderer_drop_pending(&job->pending); /* whoever drops what is over may do so with the job from here on */
+}
+
+/* Pictures that travel arrive, or turn out to be lost. */
+static void await_transfers(struct render_thread *thread)
+{
+	heartbeat_begin(&thread->heartbeat, thread->config->hang_ms);
+	while (thread->transfers.count > 0)
+		end_arrived(thread, TRAVEL_MS);
+	heartbeat_end(&thread->heartbeat);
+}
+
+static void recover(struct render_thread *thread, enum care_reason reason)
+{
+	thread->state = RENDER_THREAD_RECOVERING;
+	await_transfers(thread);
+	forget_pending(thread);
+	thread->failures = 0;
+	thread->state = renderer_care_rebuild(thread->care, reason) ? RENDER_THREAD_READY : RENDER_THREAD_FAILED;
+	if (thread->state == RENDER_THREAD_FAILED)
+		log_error("renderer: it cannot be brought up again");
+}
+
+/* Is there something to do again, so that the golden render stops? */
+static bool has_work(void *context)
+{
+	struct render_thread *thread = context;
+	heartbeat_beat(&thread->heartbeat);
+	return render_queue_depth(thread->queue) > 0;
+}
+
+static void look_after_renderer(struct render_thread *thread)
+{
+	const double idle_ms = thread->idle_since_ms > 0 ? clock_now_ms() - thread->idle_since_ms : 0;
+	enum care_reason reason = renderer_care_look(thread->care, idle_ms, has_work, thread);
+	if (reason == CARE_NONE && thread->failures >= FAILURES_MAX)
+		reason = CARE_FAILURES;
+	if (reason != CARE_NONE)
+		recover(thread, reason);
+}
+
+/* --- the queue ----------------------------------------------------------------------------------------------------------------------- */
+
+/* Waits for a job and looks after the renderer meanwhile. NULL once the queue is closed and empty. */
+static struct render_job *await_job(struct render_thread *thread)
+{
+	bool closed = false;
+	struct render_job *job = NULL;
+	while (!job && !closed && thread->state != RENDER_THREAD_FAILED) {
+		job = render_queue_pop_within(thread->queue, CARE_MS, &closed);
+		if (job || closed)
+			break;
+		if (!(thread->idle_since_ms > 0))
+			thread->idle_since_ms = clock_now_ms();
+		look_after_renderer(thread);
+	}
+	thread->idle_since_ms = 0;
+	return job;
 }
 
 static bool is_any(struct render_job *job, void *context)
@@ -131,26 +226,25 @@ static bool is_any(struct render_job *job, void *context)
 /* While pictures travel the renderer goes on with what there is to do, and looks for their arrival else. */
 static struct render_job *next_while_travelling(struct render_thread *thread)
 {
-	while (thread->transfers.count > 0) {
-		struct render_job *job = render_queue_pop_wanted(thread->queue, thread->has_pending ? may_pass : is_any, NULL);
-		if (job)
-			return job;
-		if (!(thread->busy_since_ms > 0))
-			thread->busy_since_ms = clock_now_ms();
-		end_arrived(thread, TRAVEL_MS);
+	struct render_job *job = NULL;
+	if (thread->transfers.count > 0)
+		heartbeat_begin(&thread->heartbeat, thread->config->hang_ms);
+	while (!job && thread->transfers.count > 0) {
+		job = render_queue_pop_wanted(thread->queue, thread->pending ? may_pass : is_any, NULL);
+		if (!job)
+			end_arrived(thread, TRAVEL_MS);
 	}
-	thread->busy_since_ms = 0;
-	return NULL;
+	heartbeat_end(&thread->heartbeat);
+	return job;
 }
 
 /* The next job; while a reference is on its way, which stands in the queue too, one that may pass it, or that itself. */
 static struct render_job *next_job(struct render_thread *thread)
 {
-	struct render_job *next = next_while_travelling(thread);
-	if (next)
-		return next;
-	struct render_job *job = thread->has_pending ? render_queue_pop_wanted(thread->queue, may_pass, NULL) : NULL;
-	return job ? job : render_queue_pop(thread->queue);
+	struct render_job *job = next_while_travelling(thread);
+	if (!job && thread->pending)
+		job = render_queue_pop_wanted(thread->queue, may_pass, NULL);
+	return job ? job : await_job(thread);
 }
 
 static void run_jobs(struct render_thread *thread)
@@ -158,14 +252,15 @@ static void run_jobs(struct render_thread *thread)
 	for (struct render_job *job; (job = next_job(thread));) {
 		const double start = clock_now_ms();
 		const bool was_pending = job->pending;
-		thread->busy_since_ms = start;
+		thread->idle_since_ms = 0;
+		heartbeat_begin(&thread->heartbeat, thread->config->hang_ms);
 		job->phase = RENDER_PHASE_RENDERING;
 		const enum render_result result = run_job(thread, job);
 		const bool unfinished = result == RENDER_UNFINISHED;
 		const double took = clock_now_ms() - start;
-		thread->busy_since_ms = 0;
+		heartbeat_end(&thread->heartbeat);
 		if (unfinished || was_pending)
-			thread->has_pending = unfinished;
+			thread->pending = unfinished ? job : NULL;
 		if (unfinished) {
 			settle(thread, job, took);
 			render_queue_pass(thread->queue, job);
@@ -175,6 +270,19 @@ static void run_jobs(struct render_thread *thread)
 			end_job(thread, job, result, took);
 		}
 		end_arrived(thread, 0);
+		look_after_renderer(thread);
+		if (thread->state == RENDER_THREAD_FAILED)
+			return;
+	}
+}
+
+/* Without a renderer: nobody waits in vain. */
+static void refuse_jobs(struct render_thread *thread)
+{
+	for (struct render_job *job; (job = render_queue_pop(thread->queue));) {
+		render_queue_settle(thread->queue, job, 0);
+		job->outcome = RENDER_OUTCOME_UNAVAILABLE;
+		job->finished(job);
 	}
 }
 
@@ -199,16 +307,8 @@ static bool start(struct render_thread *thread)
 	thread->kernel = kernel_file_open(config->kernel, config->state_dir);
 	if (!thread->kernel || !open_droplets(thread))
 		return false;
-	const struct renderer_params params = {
-		.device_index = config->device,
-		.require_gpu = config->require_gpu,
-		.pass_kind = (enum pass_kind)config->pass_kind,
-		.shader_dir = config->shader_dir,
-		.droplets = thread->droplets,
-		.cache_bytes = (size_t)config->cache_mb << 20,
-	};
-	thread->renderer = renderer_create(&params);
-	return thread->renderer != NULL;
+	thread->care = renderer_care_create(config, thread->droplets, &thread->heartbeat);
+	return thread->care != NULL;
 }
 
 static void *thread_main(void *context)
@@ -216,16 +316,19 @@ static void *thread_main(void *context)
 	struct render_thread *thread = context;
 	double begin = clock_now_ms();
 	if (start(thread)) {
-		const struct renderer_info *info = renderer_info(thread->renderer);
+		const struct renderer_info *info = renderer_care_info(thread->care);
 		log_info("renderer up in %.0f ms: %s, %s, OpenGL %s%s", clock_now_ms() - begin, info->vendor, info->renderer, info->version,
 			 info->software ? " (software rendering)" : "");
 		cost_model_start(thread->costs, info->software);
 		thread->state = RENDER_THREAD_READY;
 		run_jobs(thread);
+		if (thread->state == RENDER_THREAD_FAILED)
+			refuse_jobs(thread);
 	} else {
 		thread->state = RENDER_THREAD_FAILED;
 	}
-	renderer_destroy(thread->renderer);
+	if (thread->care)
+		renderer_care_close(thread->care);
 	return NULL;
 }
 
@@ -252,6 +355,7 @@ void render_thread_destroy(struct render_thread *thread)
 	if (!thread)
 		return;
 	pthread_join(thread->thread, NULL);
+	renderer_care_destroy(thread->care);
 	droplet_store_destroy(thread->droplets);
 	kernel_destroy(thread->kernel);
 	free(thread);
@@ -264,7 +368,7 @@ enum render_thread_state render_thread_state(const struct render_thread *thread)
 
 const struct renderer_info *render_thread_info(const struct render_thread *thread)
 {
-	return renderer_info(thread->renderer);
+	return renderer_care_info(thread->care);
 }
 
 const struct kernel *render_thread_kernel(const struct render_thread *thread)
@@ -279,11 +383,20 @@ struct droplet_store *render_thread_droplets(const struct render_thread *thread)
 
 size_t render_thread_cache_bytes(const struct render_thread *thread, enum stage stage)
 {
-	return renderer_cache_bytes(thread->renderer, stage);
+	return renderer_care_cache_bytes(thread->care, stage);
 }
 
 double render_thread_busy_ms(const struct render_thread *thread)
 {
-	double since = thread->busy_since_ms;
-	return since > 0 ? clock_now_ms() - since : 0;
+	return heartbeat_silence_ms(&thread->heartbeat);
+}
+
+bool render_thread_hangs(const struct render_thread *thread)
+{
+	return heartbeat_is_overdue(&thread->heartbeat);
+}
+
+struct care_counts render_thread_care(const struct render_thread *thread)
+{
+	return renderer_care_counts(thread->care);
 }

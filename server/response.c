@@ -111,6 +111,8 @@ static unsigned retry_after(const struct request *request)
 	case PROBLEM_STARTING:
 		return 2;
 	case PROBLEM_SHUTTING_DOWN:
+	case PROBLEM_UNAVAILABLE:
+	case PROBLEM_NO_MEMORY:
 		return 5;
 	default:
 		return 0;

@@ -322,15 +322,20 @@ static void encode(struct work *base)
 	work->job.phase = RENDER_PHASE_ENCODING;
 	if (work->job.frame.partial)
 		flight_waive_deadlines(&work->flight); /* what was cut short for the deadline goes out, even if that passes now */
-	const bool wanted = flight_is_wanted(&work->flight);
-	if (wanted && frame_take_pixels(&work->job.frame))
+	const bool wanted = flight_is_wanted(&work->flight), taken = wanted && frame_take_pixels(&work->job.frame);
+	if (taken)
 		image = encode_frame(work);
 	work->is_kept = image && work->may_be_kept && image_cache_keep(work->service->finished, image);
 	work->encode_ms = clock_now_ms() - start;
 	if (image)
 		cost_model_learn_encoding(work->service->costs, &work->input.scene, work->encode_ms);
 	frame_drop_pixels(&work->job.frame);
-	arrive(work, image ? RENDER_OUTCOME_OK : wanted ? RENDER_OUTCOME_FAILED : RENDER_OUTCOME_ABANDONED, image);
+	arrive(work,
+	       image    ? RENDER_OUTCOME_OK
+	       : taken  ? RENDER_OUTCOME_FAILED
+	       : wanted ? RENDER_OUTCOME_NO_MEMORY
+			: RENDER_OUTCOME_ABANDONED,
+	       image);
 }
 
 static void on_rendered(struct render_job *job)

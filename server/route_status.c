@@ -5,8 +5,11 @@
 #include "server/service.h"
 #include "server/tls.h"
 
-static const char *const state_names[] = {
-	[SERVICE_STARTING] = "starting", [SERVICE_READY] = "ready", [SERVICE_STOPPING] = "stopping", [SERVICE_FAILED] = "failed"};
+static const char *const state_names[] = {[SERVICE_STARTING] = "starting",
+					  [SERVICE_READY] = "ready",
+					  [SERVICE_RECOVERING] = "recovering",
+					  [SERVICE_STOPPING] = "stopping",
+					  [SERVICE_FAILED] = "failed"};
 
 /* Fails only when a restart helps. */
 enum MHD_Result route_healthz(struct request *request)
@@ -61,6 +64,8 @@ enum MHD_Result route_metrics(struct request *request)
 	now.asset_map_bytes = asset_maps_bytes(service->maps);
 	for (int stage = 0; stage < STAGE_COUNT && service->ready; stage++)
 		now.cache_bytes[stage] = render_thread_cache_bytes(service->render_thread, (enum stage)stage);
+	if (service->ready)
+		now.care = render_thread_care(service->render_thread);
 	if (service->ready)
 		now.droplets = droplet_store_counts(render_thread_droplets(service->render_thread));
 	return response_send_document(request, metrics_format(service->metrics, &now),

@@ -14,8 +14,12 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* A render, or what it needs, longer than this is a hang that a restart cures. */
-#define HANG_MS 300000.0
+/* Computing droplets for longer than this is a hang that a restart cures. */
+#define PREPARATION_MS_MAX 300000.0
+
+/* What is left when the renderer is gone is refused within so long; when nothing more is answered for a while the rest hangs with it. */
+#define ABANDON_MS_MAX   3000.0
+#define ABANDON_MS_STILL 300.0
 
 /* Tracing photons takes what rendering and encoding leave. */
 enum { COMPUTER_COUNT = 2, DECODER_NICE = 2, COMPUTER_NICE = 5, TRACER_NICE = 10 };
@@ -36,9 +40,7 @@ static char *pixel_version(const struct service *service)
 	struct text text = {0};
 	char program[DIGEST_SIZE] = "";
 	digest_of_file("/proc/self/exe", program);
-	const struct renderer_info *info = render_thread_info(service->render_thread);
-	text_printf(&text, "%s|%s|%s|%s|%s|%s|%d|%d|%llx", RENDERER_VERSION, program, service->images->version, info->vendor,
-		    info->renderer, info->version, (int)info->pass_kind, slab_vector_bytes(),
+	text_printf(&text, "%s|%s|%s|%d|%llx", RENDERER_VERSION, program, service->images->version, slab_vector_bytes(),
 		    kernel_hash(render_thread_kernel(service->render_thread)));
 	if (service->config->shader_dir)
 		text_printf(&text, "|%d|%f", (int)getpid(), clock_now_ms());
@@ -91,6 +93,18 @@ static bool is_over(struct render_job *job, void *context)
 	return !job->pending && render_job_is_over(job);
 }
 
+/* Images that a device made which renders wrongly are not kept: from the failed proof until it is in order again. */
+static void drop_wrong(struct service *service)
+{
+	const bool in_order = render_thread_state(service->render_thread) == RENDER_THREAD_READY;
+	const unsigned long wrong = render_thread_care(service->render_thread).golden_failed;
+	if (wrong == service->wrong_seen)
+		return;
+	image_cache_clear(service->finished);
+	if (in_order)
+		service->wrong_seen = wrong;
+}
+
 /* Renders that wait and that nobody waits for any more, or not in time, make room at once. */
 static void drop_over(void *context)
 {
@@ -100,6 +114,7 @@ static void drop_over(void *context)
 	for (struct render_job *job; (job = render_queue_remove(service->queue, is_over, NULL));)
 		job->finished(job);
 	preparation_drop_over(service->preparation);
+	drop_wrong(service);
 }
 
 struct service *service_create(const struct config *config)
@@ -224,6 +239,39 @@ void service_destroy(struct service *service)
 	free(service);
 }
 
+static bool is_any(struct render_job *job, void *context)
+{
+	(void)job, (void)context;
+	return true;
+}
+
+static void refuse_queued(struct service *service)
+{
+	for (struct render_job *job; (job = render_queue_remove(service->queue, is_any, NULL));) {
+		job->outcome = RENDER_OUTCOME_UNAVAILABLE;
+		job->finished(job);
+	}
+}
+
+void service_abandon(struct service *service)
+{
+	const double limit_ms = clock_now_ms() + ABANDON_MS_MAX;
+	service->abandoned = true;
+	service->stopping = true;
+	http_quiesce(service);
+	size_t before = service->in_flight;
+	double changed_ms = clock_now_ms();
+	while (service->in_flight > 0 && clock_now_ms() < limit_ms && clock_now_ms() < changed_ms + ABANDON_MS_STILL) {
+		refuse_queued(service);
+		usleep(5000);
+		if (service->in_flight != before)
+			changed_ms = clock_now_ms();
+		before = service->in_flight;
+	}
+	if (service->in_flight > 0)
+		log_error("%zu requests are left without an answer", (size_t)service->in_flight);
+}
+
 bool service_reload(struct service *service)
 {
 	const struct config *config = service->config;
@@ -239,13 +287,15 @@ enum service_state service_state(const struct service *service)
 {
 	if (service->render_thread && render_thread_state(service->render_thread) == RENDER_THREAD_FAILED)
 		return SERVICE_FAILED;
-	if (service->render_thread && render_thread_busy_ms(service->render_thread) > HANG_MS)
+	if (service->render_thread && render_thread_hangs(service->render_thread))
 		return SERVICE_FAILED;
-	if (service->ready && preparation_busy_ms(service->preparation) > HANG_MS)
+	if (service->ready && preparation_busy_ms(service->preparation) > PREPARATION_MS_MAX)
 		return SERVICE_FAILED;
 	if (service->stopping)
 		return SERVICE_STOPPING;
-	return service->ready ? SERVICE_READY : SERVICE_STARTING;
+	if (!service->ready)
+		return SERVICE_STARTING;
+	return render_thread_state(service->render_thread) == RENDER_THREAD_RECOVERING ? SERVICE_RECOVERING : SERVICE_READY;
 }
 
 size_t service_queue_depth(const struct service *service)
@@ -279,12 +329,15 @@ unsigned service_tracing_retry_seconds(const struct service *service)
 bool service_refuses(struct request *request)
 {
 	struct service *service = request->service;
-	if (service->stopping) {
+	if (service->abandoned || (service->ready && service_state(service) == SERVICE_FAILED)) {
+		problem_set(&request->problem, PROBLEM_UNAVAILABLE, "The renderer is gone, and the service starts anew.");
+		metrics_count_rejection(service->metrics, REJECTED_UNAVAILABLE);
+	} else if (service->stopping) {
 		problem_set(&request->problem, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
 		metrics_count_rejection(service->metrics, REJECTED_SHUTTING_DOWN);
 	} else if (!service->ready) {
 		problem_set(&request->problem, PROBLEM_STARTING, "The renderer is not ready yet.");
 		metrics_count_rejection(service->metrics, REJECTED_STARTING);
 	}
-	return service->stopping || !service->ready;
+	return request->problem.kind != PROBLEM_NONE;
 }

@@ -21,8 +21,9 @@
 enum service_state {
 	SERVICE_STARTING,
 	SERVICE_READY,
-	SERVICE_STOPPING, /* finishing what was accepted */
-	SERVICE_FAILED    /* a restart is needed */
+	SERVICE_RECOVERING, /* takes work, which waits for the renderer to be made anew */
+	SERVICE_STOPPING,   /* finishing what was accepted */
+	SERVICE_FAILED      /* a restart is needed */
 };
 
 /* Photon tracings that may wait for the one that runs. */
@@ -51,11 +52,12 @@ struct service {
 	struct decoder *decoder;
 	struct MHD_Daemon *daemon;
 	const struct image_api *images;
-	char *pixel_version; /* everything but the question that decides about an answer's bytes */
+	char *pixel_version; /* everything but the question and the device that decides about an answer's bytes */
 	char host[256];      /* listening address as a URL says it */
 	unsigned port;
 	int listening_socket; /* taken from libmicrohttpd while stopping; else negative */
 
+	unsigned long wrong_seen;    /* golden renders that failed; of the connections' thread */
 	_Atomic size_t in_flight;    /* requests read to their end and not answered to theirs */
 	_Atomic size_t memory_bytes; /* promised to pictures in work (admission.h) */
 	_Atomic size_t suspended;    /* those of them that others work for */
@@ -63,6 +65,7 @@ struct service {
 	_Atomic double computing_ms; /* what the last call did that computers worked for */
 	_Atomic bool ready;          /* has been ready to render */
 	_Atomic bool stopping;       /* takes no new work */
+	_Atomic bool abandoned;      /* since there is no renderer any more */
 	_Atomic bool giving_up;      /* drops the accepted work too */
 };
 
@@ -74,6 +77,10 @@ enum service_state service_wait(struct service *service, int milliseconds);
 
 /* Takes no new work, finishes what was accepted (within a bound), stops all threads, frees everything. Takes NULL. Main thread. */
 void service_destroy(struct service *service);
+
+/* The renderer hangs or cannot be had any more: answers what can be answered without it, for at most some seconds. Nothing is freed, and
+ * the process is to end. Main thread. */
+void service_abandon(struct service *service);
 
 /* Reads keys and certificate again; what cannot be used leaves the old ones in force. false then, with lines of the log. Main thread. */
 bool service_reload(struct service *service);

@@ -16,6 +16,8 @@ struct gl_context {
 
 enum { DEVICES_MAX = 16 };
 
+static void gl_forget_loss(void);
+
 static bool has_word(const char *list, const char *word)
 {
 	const size_t length = strlen(word);
@@ -25,21 +27,35 @@ static bool has_word(const char *list, const char *word)
 	return false;
 }
 
-static EGLContext create_core_context(EGLDisplay display, const char *extensions)
+/* robust: a context that says when it was lost, to which an access out of bounds does no harm. Attributes of EGL 1.5, which
+ * EGL_KHR_create_context shares but for the first. */
+static EGLContext create_core_context(EGLDisplay display, bool robust)
 {
-	const bool robust = has_word(extensions, "EGL_EXT_create_context_robustness");
-	EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-			       4,
-			       EGL_CONTEXT_MINOR_VERSION,
-			       5,
-			       EGL_CONTEXT_OPENGL_PROFILE_MASK,
-			       EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-			       EGL_CONTEXT_OPENGL_DEBUG,
-			       EGL_TRUE,
-			       robust ? EGL_CONTEXT_OPENGL_ROBUST_ACCESS : EGL_NONE,
-			       EGL_TRUE,
-			       EGL_NONE};
+	const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
+				     4,
+				     EGL_CONTEXT_MINOR_VERSION,
+				     5,
+				     EGL_CONTEXT_OPENGL_PROFILE_MASK,
+				     EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+				     EGL_CONTEXT_OPENGL_DEBUG,
+				     EGL_TRUE,
+				     robust ? EGL_CONTEXT_OPENGL_ROBUST_ACCESS : EGL_NONE,
+				     EGL_TRUE,
+				     EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY,
+				     EGL_LOSE_CONTEXT_ON_RESET,
+				     EGL_NONE};
 	return eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes);
+}
+
+static EGLContext create_best_context(EGLDisplay display, const char *platform, const char *extensions)
+{
+	EGLContext context = EGL_NO_CONTEXT;
+	if (has_word(extensions, "EGL_EXT_create_context_robustness"))
+		context = create_core_context(display, true);
+	if (context != EGL_NO_CONTEXT)
+		return context;
+	log_debug("egl: %s: no robust context", platform);
+	return create_core_context(display, false);
 }
 
 /* Initialises a display and makes a context on it current. Everything is undone on failure. */
@@ -59,7 +75,7 @@ static bool bring_up(struct gl_context *context, EGLDisplay display, const char 
 		log_warning("egl: %s: no surfaceless OpenGL", platform);
 		goto terminate;
 	}
-	context->context = create_core_context(display, extensions);
+	context->context = create_best_context(display, platform, extensions);
 	if (context->context == EGL_NO_CONTEXT) {
 		log_warning("egl: %s: no OpenGL 4.5 core context (0x%04x)", platform, eglGetError());
 		goto terminate;
@@ -143,6 +159,9 @@ static void read_info(struct gl_context_info *info)
 	snprintf(info->version, sizeof info->version, "%s", (const char *)glGetString(GL_VERSION));
 	for (size_t i = 0; i < sizeof software_names / sizeof *software_names; i++)
 		info->software |= strstr(info->renderer, software_names[i]) != NULL;
+	GLint strategy = 0;
+	glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
+	info->tells_of_resets = strategy == GL_LOSE_CONTEXT_ON_RESET;
 	glGetIntegerv(GL_MAX_TEXTURE_SIZE, &info->max_texture_size);
 	glGetIntegerv(GL_MAX_DRAW_BUFFERS, &info->max_draw_buffers);
 	glGetIntegerv(GL_MAX_IMAGE_UNITS, &info->max_image_units);
@@ -160,9 +179,10 @@ struct gl_context *gl_context_create(int device_index, bool require_gpu)
 			  "was tried)");
 		goto fail;
 	}
+	gl_forget_loss();
 	read_info(&context->info);
-	log_info("gl: %s, %s, %s (%s%s)", context->info.vendor, context->info.renderer, context->info.version, context->info.platform,
-		 context->info.software ? ", software" : "");
+	log_info("gl: %s, %s, %s (%s%s%s)", context->info.vendor, context->info.renderer, context->info.version, context->info.platform,
+		 context->info.software ? ", software" : "", context->info.tells_of_resets ? ", tells of resets" : "");
 	if (context->info.software && require_gpu) {
 		log_error("gl: %s renders on the processor, and --require-gpu refuses that", context->info.renderer);
 		goto fail;
@@ -197,14 +217,27 @@ const struct gl_context_info *gl_context_info(const struct gl_context *context)
 	return &context->info;
 }
 
-static _Thread_local bool memory_error, lost;
+static _Thread_local bool memory_error;
+static _Thread_local enum gl_loss loss;
 
+static void gl_forget_loss(void)
+{
+	loss = GL_NOT_LOST;
+}
+
+/* The status is that of a reset that goes on: told once, perhaps, and the context is lost for good. */
 bool gl_was_reset(const char *what)
 {
-	if (glGetGraphicsResetStatus() == GL_NO_ERROR)
-		return false;
-	log_error("gl: context lost (%s)", what);
-	lost = true;
+	static const char *const words[] = {[GL_LOST_GUILTY] = "by what was rendered in it",
+					    [GL_LOST_INNOCENT] = "by another one",
+					    [GL_LOST_UNKNOWN] = "nobody knows by what"};
+	const GLenum status = loss ? GL_NO_ERROR : glGetGraphicsResetStatus();
+	if (status == GL_NO_ERROR)
+		return loss;
+	loss = status == GL_GUILTY_CONTEXT_RESET     ? GL_LOST_GUILTY
+	       : status == GL_INNOCENT_CONTEXT_RESET ? GL_LOST_INNOCENT
+						     : GL_LOST_UNKNOWN;
+	log_error("gl: context lost (%s), %s", what, words[loss]);
 	return true;
 }
 
@@ -224,9 +257,9 @@ bool gl_failed(const char *what)
 	return failed;
 }
 
-bool gl_lost(void)
+enum gl_loss gl_lost(void)
 {
-	return lost;
+	return loss;
 }
 
 bool gl_failed_for_memory(void)

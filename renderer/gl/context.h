@@ -15,6 +15,7 @@ struct gl_context_info {
 	char vendor[128], renderer[128], version[128]; /* strings of OpenGL */
 	char platform[64];                             /* "device 0" or "surfaceless" */
 	bool software;                                 /* renders on the processor */
+	bool tells_of_resets;                          /* else nobody hears of a lost context but by errors */
 	int max_texture_size;                          /* texels of one side */
 	int max_draw_buffers;                          /* outputs of one fragment pass */
 	int max_image_units;                           /* outputs of one compute pass */
@@ -35,8 +36,11 @@ bool gl_failed(const char *what);
 /* True when the context was lost (logged with `what`). Leaves errors where they are. Owner thread. */
 bool gl_was_reset(const char *what);
 
-/* True once one of these has seen the context lost: nothing rendered in it will come out any more. Owner thread. */
-bool gl_lost(void);
+enum gl_loss { GL_NOT_LOST, GL_LOST_GUILTY, GL_LOST_INNOCENT, GL_LOST_UNKNOWN };
+
+/* Not 0 once one of these has seen this thread's context lost, by whose fault as far as the driver knows: nothing rendered in it will come
+ * out any more. gl_context_create begins anew. Owner thread. */
+enum gl_loss gl_lost(void);
 
 /* True when the error last seen by gl_failed was GL_OUT_OF_MEMORY. Owner thread. */
 bool gl_failed_for_memory(void);

@@ -69,6 +69,20 @@ static bool assemble(struct source *source, const struct pass_compiler *compiler
 	return source_include(source, compiler->shader_dir, type == GL_VERTEX_SHADER ? "shaders/lib/scene_block.glsl" : desc->file);
 }
 
+/* Drivers say where by a number of a file and a line, "2:17(5)" or "2(17)": its name comes before that. */
+static void report_place(const struct source *source, const char *text)
+{
+	int file, line;
+	for (; text; text = strchr(text, '\n')) {
+		text += strspn(text, "\n");
+		if ((sscanf(text, "%d:%d", &file, &line) != 2 && sscanf(text, "%d(%d)", &file, &line) != 2) || file < 0 ||
+		    file >= source->file_count || !strstr(text, "rror"))
+			continue;
+		log_error("gl: %s:%d: %.*s", source->files[file], line, (int)strcspn(text, "\n"), text);
+		return;
+	}
+}
+
 /* The info log is read whether or not it failed: warnings belong into the log too. */
 static bool report(const char *what, const char *name, GLint ok, const char *text)
 {
@@ -80,24 +94,25 @@ static bool report(const char *what, const char *name, GLint ok, const char *tex
 	return ok;
 }
 
-static GLuint compile(GLenum type, const char *text, const char *name)
+static GLuint compile(GLenum type, const struct source *source, const char *name)
 {
 	char message[4096] = "";
 	GLint ok = 0;
 	const GLuint shader = glCreateShader(type);
-	glShaderSource(shader, 1, &text, NULL);
+	glShaderSource(shader, 1, (const GLchar *const *)&source->text, NULL);
 	glCompileShader(shader);
 	glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
 	glGetShaderInfoLog(shader, sizeof message, NULL, message);
 	if (!report("compiling", name, ok, message)) {
+		report_place(source, message);
 		glDeleteShader(shader);
 		return 0;
 	}
 	return shader;
 }
 
-/* vertices: text of the vertex program, of fragment passes. */
-static bool link(struct pass *pass, const char *text, const char *vertices)
+/* vertices: the vertex program, of fragment passes. */
+static bool link(struct pass *pass, const struct source *text, const struct source *vertices)
 {
 	char message[4096] = "";
 	GLint ok = 0;
@@ -144,7 +159,7 @@ struct pass *pass_create(const struct pass_compiler *compiler, const struct pass
 	pass->adds = desc->adds;
 	pass->compute = compiler->kind == PASS_COMPUTE || desc->outputs == 0;
 	if (!assemble(&source, compiler, desc, pass->compute ? GL_COMPUTE_SHADER : GL_FRAGMENT_SHADER) ||
-	    (!pass->compute && !assemble(&vertices, compiler, desc, GL_VERTEX_SHADER)) || !link(pass, source.text, vertices.text))
+	    (!pass->compute && !assemble(&vertices, compiler, desc, GL_VERTEX_SHADER)) || !link(pass, &source, &vertices))
 		goto fail;
 	look_up_uniforms(pass, desc);
 	if (!pass->compute) {

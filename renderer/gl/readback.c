@@ -92,6 +92,8 @@ enum readback_state readback_await(struct readback_slot *slot, double millisecon
 {
 	if (!slot->fence)
 		return READBACK_LOST; /* OpenGL had none to give */
+	if (gl_lost())
+		return READBACK_LOST; /* a lost context need not let a fence pass */
 	switch (glClientWaitSync(slot->fence, GL_SYNC_FLUSH_COMMANDS_BIT, (GLuint64)(milliseconds * 1e6))) {
 	case GL_TIMEOUT_EXPIRED:
 		return READBACK_TRAVELS;

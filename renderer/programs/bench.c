@@ -2,6 +2,7 @@
  *
  * Every number of a scene that matters for looks can be set as NAME=VALUE, which makes it a tool for working on shaders too. */
 #include "renderer/gl/timer.h"
+#include "renderer/golden.h"
 #include "renderer/optics/kernel.h"
 #include "renderer/renderer.h"
 
@@ -73,10 +74,12 @@ static void usage(FILE *to)
 {
 	fprintf(to, "usage: render-bench [-k KERNEL] [-s SHADER_DIR] [-p auto|fragment|compute] [-d DEVICE] [-n FRAMES] [-w WIDTH] [-h "
 		    "HEIGHT]\n"
-		    "                    [-S SEED] [-r RESOLUTION] [-R] [-o FILE.ppm|FILE.pfm] [-l LAYER] [NAME=VALUE ...]\n"
+		    "                    [-S SEED] [-r RESOLUTION] [-R] [-o FILE.ppm|FILE.pfm] [-l LAYER] [-g FILE] [NAME=VALUE ...]\n"
 		    "Renders the default scene with these changes and prints milliseconds per stage of the first frame, of a repeated one "
 		    "with the\n"
-		    "camera turned, and of one with another time. -l says which layer a PFM gets. -R switches the radiosity off. NAME is a "
+		    "camera turned, and of one with another time. -l says which layer a PFM gets. -R switches the radiosity off. -g writes "
+		    "the golden render's "
+		    "values and no more. NAME is a "
 		    "member as in JSON (camera.z_m "
 		    "for heights).\n");
 }
@@ -197,13 +200,26 @@ static bool render(struct renderer *renderer, const struct scene *scene, const c
 	return ok;
 }
 
+static bool write_golden(struct renderer *renderer, const char *path)
+{
+	struct golden_picture picture;
+	if (golden_render(renderer, NULL, NULL, &picture) != GOLDEN_PASSED)
+		return false;
+	golden_compare(&picture, &golden_expected);
+	FILE *file = fopen(path, "w");
+	if (!file)
+		return false;
+	golden_print(&picture, file);
+	return fclose(file) == 0;
+}
+
 int main(int argc, char **argv)
 {
-	const char *kernel_path = "build/mie.kernel", *output = NULL;
+	const char *kernel_path = "build/mie.kernel", *output = NULL, *golden = NULL;
 	struct renderer_params params = {.device_index = -1};
 	struct scene scene = scene_default();
 	int frames = 3, width = 0, height = 0, option, status = 1;
-	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:r:Ro:l:")) != -1) {
+	while ((option = getopt(argc, argv, "k:s:p:d:n:w:h:S:r:Ro:l:g:")) != -1) {
 		switch (option) {
 		case 'k':
 			kernel_path = optarg;
@@ -237,6 +253,9 @@ int main(int argc, char **argv)
 			break;
 		case 'o':
 			output = optarg;
+			break;
+		case 'g':
+			golden = optarg;
 			break;
 		case 'l':
 			for (int i = 0; scene_layer_names[i]; i++)
@@ -272,6 +291,10 @@ int main(int argc, char **argv)
 	struct renderer *renderer = params.droplets ? renderer_create(&params) : NULL;
 	if (!renderer)
 		goto end;
+	if (golden) {
+		status = write_golden(renderer, golden) ? 0 : 1;
+		goto end;
+	}
 	printf("start %.0f ms on %s\n", clock_milliseconds() - begin, renderer_info(renderer)->renderer);
 	if (!render(renderer, &scene, "first", output))
 		goto end;

@@ -51,10 +51,10 @@ class Answer:
 
 
 class Daemon:
-    def __init__(self, folder, *flags):
+    def __init__(self, folder, *flags, program=("stratusd",)):
         self.log = folder / "stderr.txt"
         self.stderr = open(self.log, "wb")
-        command = [str(BUILD / "stratusd"), "--listen", "127.0.0.1:0", "--state-dir", str(folder / "state")]
+        command = [str(BUILD / program[0]), *program[1:], "--listen", "127.0.0.1:0", "--state-dir", str(folder / "state")]
         if KERNEL.exists():
             command += ["--kernel", str(KERNEL)]
         self.process = subprocess.Popen(

@@ -113,6 +113,9 @@ def run(*flags, **environment):
         ["--header-max-kb", "2048"],
         ["--body-max-kb=all"],
         ["--read-timeout-s", "0.5"],
+        ["--recycle-mb=-1"],
+        ["--golden-s=often"],
+        ["--hang-ms", "0"],
         ["--image-cache", "-1"],
         ["--image-cache", "1.5M"],
         ["--image-cache=1T"],
@@ -146,7 +149,7 @@ def test_settings_are_printed():
 
 def test_help_and_version():
     text = run("--help").stdout
-    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb image-cache droplets-mb droplets-disk-mb asset-max-mb asset-count assets-disk-mb assets-mb log-level log-format".split():
+    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb recycle-mb golden-s hang-ms image-cache droplets-mb droplets-disk-mb asset-max-mb asset-count assets-disk-mb assets-mb log-level log-format".split():
         assert "--" + flag in text and "STRATUS_" + flag.upper().replace("-", "_") in text
     assert run("--version").stdout.startswith("stratus ")
 

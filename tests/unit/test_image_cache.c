@@ -122,6 +122,26 @@ static void test_a_dropped_image_stays_for_who_holds_it(void **state)
 
 enum { THREADS = 4, ROUNDS = 20000, TAGS = 64 };
 
+static void test_all_are_dropped_at_once(void **state)
+{
+	(void)state;
+	struct image_cache *cache = image_cache_create(100000);
+	for (unsigned i = 0; i < 9; i++)
+		assert_true(keep(cache, i, 1000));
+	struct finished_image *held = find(cache, 3);
+	image_cache_clear(cache);
+	image_cache_clear(cache);
+	for (unsigned i = 0; i < 9; i++)
+		assert_false(has(cache, i));
+	assert_int_equal(held->data[0], 3);
+	finished_image_release(held);
+	const struct image_cache_counts counts = image_cache_counts(cache);
+	assert_int_equal(counts.images, 0);
+	assert_int_equal(counts.bytes, 0);
+	assert_true(keep(cache, 3, 1000));
+	image_cache_destroy(cache);
+}
+
 static void *work(void *argument)
 {
 	struct image_cache *cache = argument;
@@ -183,6 +203,7 @@ int main(void)
 		cmocka_unit_test(test_nothing_is_kept_without_room),
 		cmocka_unit_test(test_the_same_twice),
 		cmocka_unit_test(test_a_dropped_image_stays_for_who_holds_it),
+		cmocka_unit_test(test_all_are_dropped_at_once),
 		cmocka_unit_test(test_many_threads),
 		cmocka_unit_test(test_directives_of_a_request),
 	};

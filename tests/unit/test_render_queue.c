@@ -159,6 +159,27 @@ struct pusher {
 	pthread_t thread;
 };
 
+static void waiting_ends(void **state)
+{
+	(void)state;
+	struct render_queue *queue = render_queue_create(&(struct render_queue_limits){3, 1e9});
+	struct picture picture;
+	bool closed = true;
+	const double begin_ms = clock_now_ms();
+	assert_null(render_queue_pop_within(queue, 30, &closed));
+	assert_false(closed);
+	assert_true(clock_now_ms() - begin_ms >= 29);
+	init(&picture, 0, 16, 16);
+	assert_true(render_queue_push(queue, &picture.job));
+	render_queue_close(queue);
+	assert_ptr_equal(render_queue_pop_within(queue, 60000, &closed), &picture.job);
+	assert_false(closed);
+	render_queue_settle(queue, &picture.job, 1);
+	assert_null(render_queue_pop_within(queue, 60000, &closed));
+	assert_true(closed);
+	render_queue_destroy(queue);
+}
+
 static void *push_all(void *context)
 {
 	const struct pusher *pusher = context;
@@ -232,10 +253,8 @@ static void many_threads(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(limits),
-		cmocka_unit_test(previews_pass_a_batch),
-		cmocka_unit_test(who_has_gone_makes_room),
-		cmocka_unit_test(many_threads),
+		cmocka_unit_test(limits),       cmocka_unit_test(previews_pass_a_batch), cmocka_unit_test(who_has_gone_makes_room),
+		cmocka_unit_test(waiting_ends), cmocka_unit_test(many_threads),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

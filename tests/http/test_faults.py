@@ -1,0 +1,392 @@
+"""What becomes of requests, probes and the process when the GPU, its driver or the memory fail.
+
+The daemon is build/stratusd-faulty: the delivered one, linked with tests/faults/faults.c, which makes what it calls fail when told to.
+"""
+import concurrent.futures
+import http.client
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+
+from conftest import BUILD, KERNEL, ROOT, SANITIZED, Daemon, wait_for
+
+SMALL = {"width": 64, "height": 48}
+SLOW = 5 if SANITIZED else 1
+
+
+class FaultyDaemon(Daemon):
+    def __init__(self, folder, *flags):
+        self.faults = folder / "faults"
+        self.faults.mkdir()
+        super().__init__(folder, *flags, program=("stratusd-faulty", "--faults", str(self.faults)))
+
+    def fail(self, name, number=0):
+        os.symlink(str(number), self.faults / name)
+
+    def heal(self, name):
+        (self.faults / name).unlink()
+
+    def has_failed(self, name):
+        return not os.path.lexists(self.faults / name)
+
+    def resets(self, reason):
+        return self.metric(f'stratus_gl_context_resets_total{{reason="{reason}"}}')
+
+    def is_ready(self):
+        return self.get("/readyz").status == 200
+
+    @property
+    def text(self):
+        return self.log.read_text(errors="replace")
+
+
+@pytest.fixture
+def start_faulty(tmp_path):
+    started = []
+
+    def start(*flags):
+        folder = tmp_path / f"faulty{len(started)}"
+        folder.mkdir()
+        started.append(FaultyDaemon(folder, *flags))
+        return started[-1]
+
+    yield start
+    for daemon in started:
+        daemon.stop()
+        daemon.assert_clean()
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory):
+    """One for all faults that a daemon survives."""
+    daemon = FaultyDaemon(tmp_path_factory.mktemp("faulty"))
+    yield daemon
+    status = daemon.stop()
+    daemon.assert_clean()
+    assert status == 0
+
+
+@pytest.fixture(scope="module", autouse=True)
+def doomed(tmp_path_factory):
+    """One whose device never comes back: it gives up after half a minute, while the other tests run. (daemon, running requests)"""
+    daemon = FaultyDaemon(tmp_path_factory.mktemp("doomed"))
+    pool = concurrent.futures.ThreadPoolExecutor(2)
+    daemon.fail("gone")
+    daemon.fail("gl-reset", 0)
+    yield daemon, [pool.submit(daemon.render, {"clouds": {"seed": i}, "output": SMALL}) for i in range(2)]
+    daemon.stop()
+    pool.shutdown()
+    daemon.assert_clean()
+
+
+# --- the delivered program ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_delivered_program_knows_no_faults(tmp_path):
+    result = subprocess.run([BUILD / "stratusd", "--faults", tmp_path], capture_output=True, text=True, timeout=120)
+    assert result.returncode == 2 and "unknown flag '--faults'" in result.stderr
+    assert "--faults" not in subprocess.run([BUILD / "stratusd", "--help"], capture_output=True, text=True, timeout=120).stdout
+    words = (b"--faults", b"faulty_gl", b"host-memory", b"__wrap_")
+    delivered, faulty = (BUILD / "stratusd").read_bytes(), (BUILD / "stratusd-faulty").read_bytes()
+    assert not any(word in delivered for word in words)
+    assert all(word in faulty for word in words)
+
+
+# --- a lost context ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("after", [0, 3, 9])
+def test_a_lost_context(faulty, after):
+    """The picture comes out all the same, and is the same as before."""
+    scene = {"clouds": {"seed": 40 + after}, "output": SMALL}
+    expected = faulty.render(scene)
+    resets, repeated = faulty.resets("guilty"), faulty.metric("stratus_renders_repeated_total")
+    faulty.fail("gl-reset", after)
+    answers = [faulty.render({**scene, "sun": {"elevation_deg": 30 + i}}) for i in range(3)]
+    assert [a.status for a in answers] == [200] * 3
+    assert faulty.has_failed("gl-reset")
+    assert wait_for(lambda: faulty.resets("guilty") == resets + 1)
+    assert wait_for(faulty.is_ready)
+    again = faulty.render(scene)
+    assert (again.status, again.body, again.headers["ETag"]) == (200, expected.body, expected.headers["ETag"])
+    assert faulty.metric("stratus_renders_repeated_total") - repeated in (0, 1)  # 0: noticed between two of them
+
+
+def test_a_context_lost_in_the_middle_of_a_picture(faulty):
+    repeated = faulty.metric("stratus_renders_repeated_total")
+    faulty.fail("gl-reset", 2)  # the first passes of a new sky ask more often
+    answer = faulty.render({"sun": {"elevation_deg": 12.25}, "clouds": {"seed": 99}, "output": {"width": 320, "height": 240}})
+    assert answer.status == 200
+    assert faulty.metric("stratus_renders_repeated_total") == repeated + 1
+
+
+def test_a_scene_that_loses_every_context(faulty):
+    """It is given up after the second time, and others go on."""
+    resets = faulty.resets("guilty")
+    faulty.fail("poison", 333)
+    answer = faulty.render({"output": {"width": 333, "height": 48}})
+    assert answer.status == 500
+    assert answer.json["type"] == "urn:stratus:problem:render-failed"
+    faulty.heal("poison")
+    assert wait_for(faulty.is_ready)
+    assert faulty.resets("guilty") == resets + 2
+    assert faulty.render({"output": {"width": 333, "height": 48}}).status == 200
+
+
+def test_failures_on_end(faulty):
+    """Of renders that fail without the driver's saying why each is answered so, and after the third the renderer is made anew."""
+    scene = {"clouds": {"seed": 90}, "output": SMALL}
+    faulty.render(scene)
+    for turn in range(3):
+        assert faulty.resets("failures") == 0
+        faulty.fail("gl-error")
+        assert faulty.render({**scene, "camera": {"azimuth_deg": 10 * turn}}).status == 500
+    assert wait_for(lambda: faulty.resets("failures") == 1)
+    assert wait_for(faulty.is_ready)
+    assert faulty.render(scene, Cache_Control="no-cache").status == 200
+
+
+def test_many_requests_over_a_reset(faulty):
+    """Whoever waits notices only that it takes longer."""
+    with concurrent.futures.ThreadPoolExecutor(6) as pool:
+        running = [pool.submit(faulty.render, {"clouds": {"seed": 60 + i}, "output": SMALL}) for i in range(6)]
+        faulty.fail("gl-reset", 5)
+        assert [r.result().status for r in running] == [200] * 6
+    faulty.render({"clouds": {"seed": 70}, "output": SMALL})
+    assert wait_for(lambda: faulty.has_failed("gl-reset"))
+    assert wait_for(faulty.is_ready)
+
+
+def test_a_reference_over_a_reset(faulty):
+    """It begins again when the context is lost for another picture that passed it."""
+    reference = {"model": {"name": "reference", "samples": 32, "seed": 8}, "output": {"width": 64, "height": 48}}
+    resets, repeated = faulty.resets("guilty"), faulty.metric("stratus_renders_repeated_total")
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        running = pool.submit(faulty.render, reference)
+        assert wait_for(lambda: faulty.metric("stratus_requests_in_flight") == 2)
+        faulty.fail("gl-reset", 1)
+        answer = running.result()
+    assert answer.status == 200 and answer.headers["Stratus-Samples"] == "32"
+    assert faulty.resets("guilty") == resets + 1
+    assert faulty.metric("stratus_renders_repeated_total") == repeated + 1
+    again = faulty.render(reference, Cache_Control="no-cache")
+    assert again.body == answer.body
+
+
+def test_a_device_that_is_gone_for_a_while(faulty):
+    """Not ready, but alive; what is asked for meanwhile is answered when the device is back."""
+    faulty.fail("gone")
+    faulty.fail("gl-reset", 0)
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        running = [pool.submit(faulty.render, {"clouds": {"seed": 80 + i}, "output": SMALL}) for i in range(2)]
+        assert wait_for(lambda: faulty.get("/readyz").json["status"] == "recovering")
+        assert faulty.get("/readyz").status == 503
+        assert faulty.get("/healthz").status == 200
+        assert faulty.metric("stratus_ready") == 0
+        assert faulty.get("/v1/presets").status == 200
+        assert wait_for(lambda: "tries to bring it up again failed" in faulty.text)
+        faulty.heal("gone")
+        assert [r.result().status for r in running] == [200] * 2
+    assert wait_for(faulty.is_ready)
+
+
+# --- memory ------------------------------------------------------------------------------------------------------------------------
+
+
+def check_no_memory(daemon, answer):
+    assert answer.status == 503
+    assert answer.json["type"] == "urn:stratus:problem:no-memory"
+    assert int(answer.headers["Retry-After"]) >= 1
+    assert daemon.get("/healthz").status == 200 and daemon.is_ready()
+
+
+def test_no_memory_on_the_device(faulty):
+    scene = {"sun": {"elevation_deg": 51.5}, "output": SMALL}
+    faulty.fail("gl-memory")
+    check_no_memory(faulty, faulty.render(scene))
+    assert faulty.has_failed("gl-memory")
+    assert faulty.render(scene).status == 200
+
+
+def test_no_memory_on_the_host(faulty):
+    scene = {"clouds": {"seed": 5}, "output": {"width": 512, "height": 384}}
+    faulty.render({**scene, "output": SMALL})  # so that nothing but the picture itself is new
+    faulty.fail("host-memory", 512 * 384 * 3)
+    check_no_memory(faulty, faulty.render(scene))
+    assert faulty.has_failed("host-memory")
+    assert faulty.render(scene).status == 200
+
+
+# --- the golden render ---------------------------------------------------------------------------------------------------------------
+
+
+def test_a_device_that_draws_nothing(start_faulty):
+    """It is noticed without a request, and so is that it draws again."""
+    daemon = start_faulty("--golden-s", "1")
+    assert wait_for(lambda: daemon.metric('stratus_golden_renders_total{result="passed"}') >= 2)
+    scene = {"clouds": {"seed": 7}, "output": SMALL}
+    daemon.fail("black")
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        early = pool.submit(daemon.render, scene)  # comes out wrong, or waits when the golden render was quicker
+        assert wait_for(lambda: not daemon.is_ready())
+        assert daemon.get("/healthz").status == 200
+        assert wait_for(lambda: daemon.metric('stratus_golden_renders_total{result="failed"}') >= 1)
+        daemon.heal("black")
+        assert early.result().status == 200
+    assert wait_for(daemon.is_ready)
+    assert daemon.resets("golden") == 1
+    assert "golden render: " in daemon.text
+    assert daemon.render(scene).body == daemon.render(scene, Cache_Control="no-cache").body  # nothing of that time is kept
+
+
+def start_in_vain(program, *flags, folder):
+    result = subprocess.run(
+        [BUILD / program, *flags, "--listen", "127.0.0.1:0", "--state-dir", folder / "state", "--kernel", KERNEL],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert result.returncode == 1
+    assert result.stdout == ""
+    return result.stderr
+
+
+def test_start_on_a_device_that_draws_nothing(tmp_path):
+    os.symlink("0", tmp_path / "black")
+    error = start_in_vain("stratusd-faulty", "--faults", tmp_path, folder=tmp_path)
+    assert "golden render: " in error and "does not render as it should" in error
+
+
+def test_start_with_a_shader_that_does_not_compile(tmp_path):
+    """The log names file and line."""
+    shutil.copytree(ROOT / "shaders", tmp_path / "shaders")
+    path = tmp_path / "shaders" / "lib" / "atmosphere.glsl"
+    lines = path.read_text().split("\n")
+    lines.insert(20, "this is no GLSL;")
+    path.write_text("\n".join(lines))
+    error = start_in_vain("stratusd", "--shader-dir", tmp_path / "shaders", folder=tmp_path)
+    assert re.search(r" error +gl: shaders/lib/atmosphere.glsl:21: .*error", error), error
+    assert "renderer: cannot start" in error
+
+
+# --- a hang --------------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_device_that_hangs(start_faulty):
+    """Not ready at once, what waits is refused, and the process ends with a status that has it started again."""
+    daemon = start_faulty("--hang-ms", str(1500 * SLOW), "--golden-s", "0")
+    probe = daemon.connect()
+    probe.request("GET", "/readyz")
+    assert probe.getresponse().read()
+    daemon.fail("hang", 3600)
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        hanging = pool.submit(daemon.render, {"clouds": {"seed": 1}, "output": SMALL})
+        assert wait_for(lambda: daemon.has_failed("hang"))
+        waiting = [pool.submit(daemon.render, {"clouds": {"seed": 2 + i}, "output": SMALL}) for i in range(3)]
+        begin = time.monotonic()
+        answers = [w.result() for w in waiting]
+        assert [a.status for a in answers] == [503] * 3
+        assert {a.json["type"] for a in answers} == {"urn:stratus:problem:renderer-unavailable"}
+        assert daemon.process.wait(timeout=60) == 3
+        assert time.monotonic() - begin < 30
+        with pytest.raises((ConnectionError, http.client.HTTPException)):
+            hanging.result()
+    assert "the renderer hangs or is gone" in daemon.text
+    probe.close()
+
+
+# --- growth --------------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_context_that_grows_is_made_anew(start_faulty):
+    daemon = start_faulty("--recycle-mb", "400", "--golden-s", "0")
+    before = daemon.metric("stratus_process_resident_memory_bytes")
+    daemon.render({"output": SMALL})
+    time.sleep(1.5)
+    assert daemon.resets("memory") == 0
+    daemon.fail("growth", 600)
+    assert daemon.render({"sun": {"elevation_deg": 33}, "output": SMALL}).status == 200
+    assert wait_for(lambda: daemon.resets("memory") == 1)
+    assert wait_for(daemon.is_ready)
+    assert daemon.metric("stratus_process_resident_memory_bytes") < before + 400e6
+    assert daemon.render({"sun": {"elevation_deg": 34}, "output": SMALL}).status == 200
+    time.sleep(1.5)
+    assert daemon.resets("memory") == 1
+
+
+# --- signals -------------------------------------------------------------------------------------------------------------------------
+
+
+def busy(daemon, pool, count=3, seconds=1):
+    """So many accepted renders, the first of which takes so long."""
+    daemon.fail("hang", seconds)
+    running = [pool.submit(daemon.render, {"clouds": {"seed": 20 + i}, "output": SMALL}) for i in range(count)]
+    assert wait_for(lambda: daemon.has_failed("hang") and daemon.metric("stratus_requests_in_flight") == count + 1)
+    return running
+
+
+def test_drain(start_faulty):
+    """Readiness goes first, what was accepted is finished, and the status is 0."""
+    daemon = start_faulty()
+    probe = daemon.connect()
+    probe.request("GET", "/readyz")
+    probe.getresponse().read()
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        running = busy(daemon, pool, seconds=2)
+        daemon.process.send_signal(signal.SIGTERM)
+        assert wait_for(lambda: "SIGTERM: finishing accepted work" in daemon.text)
+        probe.request("GET", "/readyz")
+        answer = probe.getresponse()
+        assert (answer.status, json.loads(answer.read())["status"]) == (503, "stopping")
+        assert not any(r.done() for r in running)
+        assert [r.result().status for r in running] == [200] * 3
+    probe.close()
+    assert daemon.process.wait(timeout=60) == 0
+
+
+def test_a_second_signal_ends_at_once(start_faulty):
+    daemon = start_faulty()
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        running = busy(daemon, pool, seconds=60)
+        daemon.process.send_signal(signal.SIGTERM)
+        assert wait_for(lambda: "SIGTERM: finishing accepted work" in daemon.text)
+        daemon.process.send_signal(signal.SIGTERM)
+        time.sleep(1.2)
+        assert daemon.process.poll() is None  # a signal that comes twice is one
+        daemon.process.send_signal(signal.SIGTERM)
+        assert daemon.process.wait(timeout=20) == 1
+        for one in running:
+            with pytest.raises((ConnectionError, http.client.HTTPException)):
+                one.result()
+    assert "stopped at once by a second signal" in daemon.text
+
+
+def test_a_reset_while_draining(start_faulty):
+    daemon = start_faulty()
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        running = busy(daemon, pool)
+        daemon.fail("gl-reset", 1)
+        daemon.process.send_signal(signal.SIGTERM)
+        assert [r.result().status for r in running] == [200] * 3
+    assert daemon.process.wait(timeout=60) == 0
+    assert daemon.has_failed("gl-reset")
+
+
+# --- a device that never comes back ----------------------------------------------------------------------------------------------------
+
+
+def test_a_device_that_is_gone_for_good(doomed):
+    """The tries are bounded; who waited is refused, and the process ends with a status that has it started again."""
+    daemon, running = doomed
+    answers = [r.result() for r in running]
+    assert [a.status for a in answers] == [503] * 2
+    assert {a.json["type"] for a in answers} == {"urn:stratus:problem:renderer-unavailable"}
+    assert all(int(a.headers["Retry-After"]) >= 1 for a in answers)
+    assert daemon.process.wait(timeout=60) == 3
+    assert "8 of 8 tries to bring it up again failed" in daemon.text

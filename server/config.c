@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum option_type { OPTION_TEXT, OPTION_INTEGER, OPTION_BYTES, OPTION_FLAG, OPTION_CHOICE };
+enum option_type { OPTION_TEXT, OPTION_INTEGER, OPTION_FLAG, OPTION_CHOICE };
 
 struct option {
 	const char *name, *variable, *value_name, *help;
@@ -74,8 +74,8 @@ static const struct option options[] = {
 	 OPTION_INTEGER, AT(golden_s), .low = 0, .high = 86400},
 	{"--hang-ms", "STRATUS_HANG_MS", "MS", "without progress of the renderer after which the daemon ends, to be started anew",
 	 OPTION_INTEGER, AT(hang_ms), .low = 100, .high = 3600000},
-	{"--image-cache", "STRATUS_IMAGE_CACHE", "BYTES", "memory of finished images, also as 64K, 64M or 1G; 0: none are kept",
-	 OPTION_BYTES, AT(image_cache)},
+	{"--images-mb", "STRATUS_IMAGES_MB", "MB", "memory of finished images, to be answered again; 0: none are kept",
+	 OPTION_INTEGER, AT(images_mb), .low = 0, .high = 1048576},
 	{"--droplets-mb", "STRATUS_DROPLETS_MB", "MB", "memory of droplet tables, 16 MB for each distribution",
 	 OPTION_INTEGER, AT(droplets_mb), .low = 16, .high = 1048576},
 	{"--droplets-disk-mb", "STRATUS_DROPLETS_DISK_MB", "MB", "disk space of droplet tables in the state directory; 0: none",
@@ -134,25 +134,6 @@ static bool set_integer(const struct option *option, const char *text, int *targ
 	return true;
 }
 
-/* Digits, and K, M or G for a power of 1024. */
-static bool set_bytes(const char *text, long long *target)
-{
-	static const char suffixes[] = "KMG";
-	char *end;
-	errno = 0;
-	const long long number = strtoll(text, &end, 10);
-	if (errno || end == text || *text < '0' || *text > '9' || number > CONFIG_BYTES_MAX)
-		return false;
-	const char *suffix = *end ? strchr(suffixes, *end) : NULL;
-	if (*end && (!suffix || end[1]))
-		return false;
-	const int shift = suffix ? 10 * (int)(suffix - suffixes + 1) : 0;
-	if (number > CONFIG_BYTES_MAX >> shift)
-		return false;
-	*target = number << shift;
-	return true;
-}
-
 static bool set_flag(const char *text, bool *target)
 {
 	static const char *const words[] = {"0", "false", "no", "1", "true", "yes", NULL};
@@ -191,12 +172,6 @@ static bool set_option(const struct option *option, const char *text, const char
 			return true;
 		fprintf(stderr, "stratusd: %s must be a whole number from %d to %d, not '%s'\n", source, option->low, option->high, text);
 		return false;
-	case OPTION_BYTES:
-		if (set_bytes(text, target))
-			return true;
-		fprintf(stderr, "stratusd: %s must be a number of bytes from 0 to %lld, K, M or G behind it or not, not '%s'\n", source,
-			CONFIG_BYTES_MAX, text);
-		return false;
 	case OPTION_FLAG:
 		if (set_flag(text, target))
 			return true;
@@ -222,9 +197,6 @@ static void print_value(const struct option *option, const struct config *config
 		break;
 	case OPTION_INTEGER:
 		printf("%d", *(const int *)value);
-		break;
-	case OPTION_BYTES:
-		printf("%lld", *(const long long *)value);
 		break;
 	case OPTION_FLAG:
 		printf("%d", *(const bool *)value);
@@ -282,7 +254,7 @@ static void set_defaults(struct config *config)
 		.recycle_mb = 2048,
 		.golden_s = 60,
 		.hang_ms = 60000,
-		.image_cache = 256 << 20,
+		.images_mb = 256,
 		.droplets_mb = 256,
 		.droplets_disk_mb = 1024,
 		.asset_max_mb = 64,

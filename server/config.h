@@ -4,9 +4,6 @@
 
 #include "renderer/renderer.h"
 
-/* Of memory: a tebibyte. */
-#define CONFIG_BYTES_MAX (1LL << 40)
-
 struct config {
 	const char *listen;       /* HOST:PORT, [IPv6]:PORT; port 0: any free one */
 	const char *state_dir;    /* never NULL after config_parse; made when first needed */
@@ -49,7 +46,7 @@ struct config {
 	int body_max_kb;             /* 1..65536; of a scene */
 	int read_timeout_s;          /* 1..3600; for a request to be complete */
 
-	long long image_cache; /* bytes, 0..CONFIG_BYTES_MAX; 0: no image is kept */
+	int images_mb; /* 0..1048576; 0: finished images are not kept */
 
 	char state_dir_buffer[4096]; /* holds the default of state_dir */
 };

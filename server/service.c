@@ -128,7 +128,7 @@ struct service *service_create(const struct config *config)
 	service->config = config;
 	service->listening_socket = -1;
 	service->metrics = metrics_create();
-	service->finished = image_cache_create((size_t)config->image_cache);
+	service->finished = image_cache_create((size_t)config->images_mb << 20);
 	service->flights = service->finished ? flights_create(service->finished) : NULL;
 	const struct render_queue_limits limits = queue_limits(config);
 	service->queue = render_queue_create(&limits);

@@ -2,6 +2,7 @@
 import json
 import re
 import socket
+import time
 
 import pytest
 
@@ -110,6 +111,7 @@ def test_every_line_is_an_object(start_daemon):
     daemon = start_daemon("--log-format=json", "--log-level=debug")
     with socket.create_connection(("127.0.0.1", daemon.port), timeout=60) as client:
         client.sendall(b"GET /some\xff\xc3\xa9\"where HTTP/1.1\r\nHos")
+        time.sleep(0.5)  # libmicrohttpd overlooks an end that comes with the bytes before it, until the time for headers is over
     wait_for_requests(daemon, "json", 1)
     daemon.render({**SMALL, "ground": {"map": "none\n\"x"}})
     assert daemon.stop() == 0

@@ -124,22 +124,24 @@ def test_another_content_is_another_image(daemon, tmp_path):
 
 
 def test_memory_is_bounded(start_daemon):
-    daemon = start_daemon("--image-cache", "100K")
-    scenes = [{"camera": {"azimuth_deg": i}, "output": SMALL} for i in range(20)]
+    daemon = start_daemon("--images-mb", "1")
+    limit = 1 << 20
+    scenes = [{"camera": {"azimuth_deg": 10 * i}, "output": {"width": 320, "height": 240}} for i in range(20)]
     sizes = [len(daemon.render(scene).body) for scene in scenes]
-    assert sum(sizes) > 100 << 10 > 5 * max(sizes)
-    assert daemon.metric("stratus_image_cache_limit_bytes") == 100 << 10
-    assert 50 << 10 < daemon.metric("stratus_image_cache_bytes") <= 100 << 10
+    assert sum(sizes) > limit > 5 * max(sizes)
+    assert daemon.metric("stratus_image_cache_limit_bytes") == limit
+    assert limit / 2 < daemon.metric("stratus_image_cache_bytes") <= limit
     kept = daemon.metric("stratus_image_cache_images")
     assert daemon.metric("stratus_image_cache_evictions_total") == 20 - kept
     assert status_of(daemon.render(scenes[0])) == ["stratus", "fwd=miss", "stored"]
     assert status_of(daemon.render(scenes[-1])) == ["stratus", "hit"]
-    whole = {"output": {"width": 512, "height": 512}}
-    assert status_of(daemon.render(whole)) == status_of(daemon.render(whole)) == ["stratus", "fwd=miss"]
+    large = {"output": {"width": 2048, "height": 1536}}
+    assert len(daemon.render(large).body) > limit
+    assert status_of(daemon.render(large)) == ["stratus", "fwd=miss"]
 
 
 def test_none_are_kept(start_daemon):
-    daemon = start_daemon("--image-cache", "0")
+    daemon = start_daemon("--images-mb", "0")
     first, again = daemon.render({"output": SMALL}), daemon.render({"output": SMALL})
     assert status_of(first) == status_of(again) == ["stratus", "fwd=miss"]
     assert first.body == again.body

@@ -39,7 +39,7 @@ class Daemon:
         command = [BUILD / "stratusd-faulty", "--faults", self.faults, "--listen", "127.0.0.1:0", "--state-dir", folder / "state", "--kernel", "build/mie.kernel",
                    "--log-format", "json", "--golden-s", "5", "--recycle-mb", "500",
                    # Small, so that they are full before memory is looked at.
-                   "--image-cache", "8M", "--droplets-mb", "48", "--cache-mb", "64"]
+                   "--images-mb", "8", "--droplets-mb", "48", "--cache-mb", "64"]
         self.process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=self.log.open("w"), text=True)
         line = self.process.stdout.readline()
         assert line.startswith("stratusd listening on "), self.log.read_text()

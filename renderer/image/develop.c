@@ -30,11 +30,11 @@ static void expose_film(float rgb[3])
 	static const float balance[3] = {0.93f, 1.015f, 1.10f};
 	for (int c = 0; c < 3; c++)
 		rgb[c] *= balance[c];
-	const float strongest = fmaxf(rgb[0], fmaxf(rgb[1], rgb[2])), square = strongest * strongest, fog = 0.002f;
-	const float share = square * (0.85f + 0.0033f * strongest) / ((square + 9) * (1 + 0.005f * strongest));
+	const float red = rgb[0], square = red * red, fog = 0.002f;
+	const float share = square * (0.85f + 0.0033f * red) / ((square + 9) * (1 + 0.005f * red));
 	for (int c = 0; c < 3; c++) {
-		const float lack = 1 - rgb[c] / fmaxf(strongest, 1e-9f);
-		rgb[c] = filmic(rgb[c] + fog * strongest) * (1 - share * lack * (0.3f + 0.7f * lack * lack));
+		const float lack = fmaxf(1 - rgb[c] / fmaxf(red, 1e-9f), 0);
+		rgb[c] = filmic(rgb[c] + fog * red) * (1 - share * lack * (0.3f + 0.7f * lack * lack));
 	}
 }
 

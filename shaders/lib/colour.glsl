@@ -23,20 +23,19 @@ float colour_filmic(float x)
 	return 1.0 - z * (z * z + 0.5 * rest * rest);
 }
 
-// By the curve alone all channels of light far beyond white end alike, white whatever its hue, the disc of a setting sun too. It goes to a tint of its own hue instead: a channel
-// loses by what it lacks to the strongest one, the more from middle greys to ten times white, where the light round a low sun is, and a little less
-// beyond, so that the disc is paler than its aureole. Not even that light is of one colour alone (COLOUR_FILM_FOG).
+// By the curve alone all channels of light far beyond white end alike, white whatever its hue, the disc of a setting sun too. Warm light goes to a tint of its own hue instead: a
+// channel loses by what it lacks to the red one, the more from middle greys to ten times white, where the light round a low sun is, and a little less
+// beyond, so that the disc is paler than its aureole. Not even that light is of one colour alone (COLOUR_FILM_FOG). Cool light, as in a corona, goes to white.
 const float COLOUR_FILM_FOG = 0.002;
 
 vec3 colour_filmic_hue(vec3 rgb)
 {
-	float strongest = max(rgb.x, max(rgb.y, rgb.z));
-	float square = strongest * strongest;
-	float share = square * (0.85 + 0.0033 * strongest) / ((square + 9.0) * (1.0 + 0.005 * strongest));
-	vec3 lack = vec3(1.0) - rgb * (1.0 / max(strongest, 1e-9));
-	vec3 kept = vec3(1.0) - share * lack * (vec3(0.3) + 0.7 * lack * lack);
-	rgb += COLOUR_FILM_FOG * strongest;
-	return kept * vec3(colour_filmic(rgb.x), colour_filmic(rgb.y), colour_filmic(rgb.z));
+	float square = rgb.x * rgb.x;
+	float share = square * (0.85 + 0.0033 * rgb.x) / ((square + 9.0) * (1.0 + 0.005 * rgb.x));
+	vec2 lack = max(vec2(1.0) - vec2(rgb.y, rgb.z) * (1.0 / max(rgb.x, 1e-9)), vec2(0.0));
+	vec2 kept = vec2(1.0) - share * lack * (vec2(0.3) + 0.7 * lack * lack);
+	rgb += COLOUR_FILM_FOG * rgb.x;
+	return vec3(colour_filmic(rgb.x), kept * vec2(colour_filmic(rgb.y), colour_filmic(rgb.z)));
 }
 
 // Rec.709 colours outside the gamut are drawn to grey until no channel is negative, which keeps their luminance.

@@ -1,6 +1,7 @@
 // The picture: what arrives at the camera along a ray, in parts that add up to the whole. W/m2/nm/sr in the three bands.
 #ifndef SHADERS_LIB_VIEW
 #define SHADERS_LIB_VIEW
+#define FIELD_WARPED 1
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/field.glsl"
 #include "shaders/lib/ground.glsl"
@@ -51,7 +52,7 @@ float view_sun_cosine(vec3 direction, float t, float height)
 float view_thickness(vec2 place, float footprint)
 {
 #if VIEW_ABOVE
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	vec2 uv = field_place(place) / cloud_layer.z;
 	return textureLod(height_light, uv, max(0.0, log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z))).z;
 #else
 	return field_thickness(place, footprint);

@@ -153,7 +153,7 @@ vec3 up_single(vec3 tau, float mu_l, float mu_v, vec3 along_light, vec3 along_vi
 // Thickness evened out over the way that light goes sideways, m. octaves: by which the footprint is larger than a texel of it.
 float up_smooth_thickness_at(vec2 place, float octaves)
 {
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	vec2 uv = field_place(place) / cloud_layer.z;
 #ifdef FIELD_NEAR
 	return packed_linear(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), 0.0);
 #else

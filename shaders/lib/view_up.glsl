@@ -206,7 +206,9 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec3 received = vec3(textureLod(cloud_received, ray.place / cloud_layer.z, 0.0));
 	vec3 diffuse = to_layer * (vec3(sky_irradiance_cloud) * light.w + received * (1.0 - light.w)) * (1.0 / PI);
 	vec3 met = vec3(1.0) - along_view;
-	vec3 radiance = vec3(near) + vec3(sky) * along_view + met * diffuse +
+	vec3 clear = (vec3(near) - (vec3(1.0) - to_layer) * vec3(air_around)) / max(vec3(air_below), vec3(1e-4)); // what was tabled, without clouds
+	vec3 beside = clear * view_air_beside(along_view, half_angle, ray.distance);
+	vec3 radiance = vec3(near) + beside + vec3(sky) * along_view + met * diffuse +
 	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * vec3(light));
 #ifndef FIELD_NEAR
 #if VIEW_LARGE_SUN

@@ -109,7 +109,8 @@ static double correlation(const double *a, const double *b, int count)
 	return ab / sqrt(fmax(aa * bb, 1e-30));
 }
 
-/* Cameras kilometres apart, one of them in another copy of the tile, see the same clouds over the same place far from both; and the one's clouds drift with the wind. */
+/* Cameras kilometres apart, one of them in another copy of the tile, see the same clouds over the same place far from both; and the one's
+ * clouds drift with the wind. */
 static void clouds_far_away_stay_where_they_are(void **state)
 {
 	(void)state;

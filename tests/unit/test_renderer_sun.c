@@ -1,4 +1,5 @@
-/* What is seen beside the sun from below: the forward peak of an even deck falls off without a notch or a ring, and the air before gaps is lit. */
+/* What is seen beside the sun from below: the forward peak of an even deck falls off without a notch or a ring, and the air before gaps is
+ * lit. */
 #include "test_renderer_common.h"
 
 #include "renderer/scene_map.h"
@@ -74,7 +75,8 @@ static void an_even_deck_has_an_even_aureole(void **state)
 	}
 }
 
-/* Beside the sun the air below the layer is brighter before gaps than before thick cloud, by the light of the beam; far from the sun it is not. */
+/* Beside the sun the air below the layer is brighter before gaps than before thick cloud, by the light of the beam; far from the sun it is
+ * not. */
 static void air_before_gaps_is_lit(void **state)
 {
 	(void)state;
@@ -98,7 +100,8 @@ static void air_before_gaps_is_lit(void **state)
 		}
 	assert_true(gaps[0] > 20 && clouds[0] > 20 && gaps[1] > 20 && clouds[1] > 20);
 	const double near_ratio = gap[0] / gaps[0] / (cloud[0] / clouds[0]), far_ratio = gap[1] / gaps[1] / (cloud[1] / clouds[1]);
-	print_message("air before gaps over that before cloud: %.2f within 6 degrees of the sun, %.2f at 25 to 30\n", near_ratio, far_ratio);
+	print_message("air before gaps over that before cloud: %.2f within 6 degrees of the sun, %.2f at 25 to 30\n", near_ratio,
+		      far_ratio);
 	assert_true(near_ratio > 2);
 	assert_true(far_ratio > 0.7 && far_ratio < 1.5);
 	frame_finish(&frame);

@@ -27,6 +27,7 @@ struct scene_block {
 	float cloud_layer[4];        /* base, m; thickness (maximum of H), m; tile, m; 1 when there are clouds */
 	float cloud_field[4];        /* share of the range where edges are thin; shift of detail, m a density; its tiles; billows, m */
 	float cloud_drift[4];        /* drift so far, m, modulo the tile: east, north; -; - */
+	float cloud_warp[4];         /* phases of its waves at the camera, turns; 1 where there is one (shaders/lib/field_warp.glsl) */
 	float cloud_puffs[4]; /* on tops seen from above: how far they bulge from crease to top, m; their tile, m; texels a side of the
 			       * height field; -
 			       */

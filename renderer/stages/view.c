@@ -107,12 +107,29 @@ static void set4(float *to, double x, double y, double z, double w)
 	to[3] = (float)w;
 }
 
+/* Phases at the camera of the waves that shift the tile's copies against each other; they move with the clouds. An uploaded map is a tile
+ * that somebody wants to see as it is. */
+static void fill_warp(struct scene_block *block, const struct scene *scene)
+{
+	static const double waves[3][2] = {{0.4158, 0.1271}, {0.0726, 0.3143}, {-0.1701, 0.1586}}; /* shaders/lib/field_warp.glsl */
+	const struct scene_clouds *clouds = &scene->clouds;
+	for (int i = 0; i < 3; i++) {
+		double turns = fmod((i + 1) * 0.6180339887 * clouds->seed, 1);
+		for (int axis = 0; axis < 2; axis++)
+			turns += waves[i][axis] * (scene->camera.position_m[axis] - clouds->wind_mps[axis] * clouds->time_s) /
+				 clouds->tile_m;
+		block->cloud_warp[i] = (float)(turns - floor(turns));
+	}
+	block->cloud_warp[3] = clouds->map.map ? 0 : 1;
+}
+
 void view_fill_camera(struct scene_block *block, const struct scene *scene, const struct camera_view *view)
 {
 	const double(*axes)[3] = view->axes;
 	const double tile = scene->clouds.tile_m;
 	const double x = scene->camera.position_m[0], y = scene->camera.position_m[1], z = scene->camera.position_m[2];
 	set4(block->camera_position, x - tile * floor(x / tile), y - tile * floor(y / tile), z, camera_pixel_angle(view));
+	fill_warp(block, scene);
 	set4(block->camera_right, axes[0][0], axes[0][1], axes[0][2], view->tangent[0]);
 	set4(block->camera_up, axes[1][0], axes[1][1], axes[1][2], view->tangent[1]);
 	set4(block->camera_forward, axes[2][0], axes[2][1], axes[2][2], view->first_row);
@@ -275,6 +292,10 @@ static bool row_is_near(const struct scene_block *block, const struct camera_vie
 	const double mu_v = ((radius + h) * lowest + distance) / (radius + base);
 	/* As camera_footprint in shaders/lib/camera.glsl. */
 	const double slant = view->projection == PROJECTION_FISHEYE ? mu_v : sqrt(mu_v);
+	/* And none so far away that the tile is warped: FIELD_WARP_BEGIN in shaders/lib/field_warp.glsl. */
+	const double across = distance * sqrt(fmax(0, 1 - lowest * lowest));
+	if (block->cloud_warp[3] > 0 && across > 0.5 * block->cloud_layer[2])
+		return false;
 	return mu_v > 0.01 && block->camera_position[3] * distance / slant < block->cloud_layer[2] / texels;
 }
 

@@ -5,6 +5,7 @@
 // which the bands would have drawn it (Wilkie et al. 2014, "Hero Wavelength Spectral Sampling": the balance heuristic over bands).
 #ifndef SHADERS_LIB_LIGHT_PATH
 #define SHADERS_LIB_LIGHT_PATH
+#include "shaders/lib/field_warp.glsl"
 #include "shaders/lib/noise.glsl"
 #include "shaders/lib/optics.glsl"
 #include "shaders/lib/sky_table.glsl"
@@ -109,7 +110,7 @@ vec3 path_up(vec3 place)
 
 vec2 path_tile(vec3 place)
 {
-	return (vec2(place) + vec2(camera_position) - vec2(cloud_drift)) / cloud_layer.z;
+	return (vec2(place) + vec2(camera_position) - vec2(cloud_drift)) / cloud_layer.z + field_warp(vec2(place) / cloud_layer.z);
 }
 
 float path_top(vec3 place)

@@ -1,6 +1,7 @@
 // The picture: what arrives at the camera along a ray, in parts that add up to the whole. W/m2/nm/sr in the three bands.
 #ifndef SHADERS_LIB_VIEW
 #define SHADERS_LIB_VIEW
+#define FIELD_WARPED 1
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/field.glsl"
 #include "shaders/lib/ground.glsl"
@@ -51,7 +52,7 @@ float view_sun_cosine(vec3 direction, float t, float height)
 float view_thickness(vec2 place, float footprint)
 {
 #if VIEW_ABOVE
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	vec2 uv = field_place(place) / cloud_layer.z;
 	return textureLod(height_light, uv, max(0.0, log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z))).z;
 #else
 	return field_thickness(place, footprint);
@@ -346,6 +347,18 @@ void view_attenuate(vec3 air, INOUT(view_parts) parts)
 }
 
 #if VIEW_CLOUDS && !VIEW_ABOVE
+// Beside the sun the beam comes to the air below the layer past the very clouds that are seen: air before a gap is lit, air before a thick cloud lies in its shadow, not both by the
+// mean. What that makes of the share of a clear sky's light that the mean leaves. along: transmittance of the layer along the view; distance: to it. Up to an offset of
+// VIEW_BEAM_ASIDE at the layer, a part of the size of clouds, and not over long ways, on which haze mixes the beams.
+const float VIEW_BEAM_ASIDE = 400.0; // m
+const float VIEW_BEAM_MIXED = 8000.0;
+
+vec3 view_air_beside(vec3 along, vec2 half_angle, float distance)
+{
+	float aside = half_angle.x * (2.0 / VIEW_BEAM_ASIDE);
+	return (along - vec3(air_below)) * (1.0 / (1.0 + distance * distance * (aside * aside + 1.0 / (VIEW_BEAM_MIXED * VIEW_BEAM_MIXED))));
+}
+
 // Upwards from below the layer.
 view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 {
@@ -376,7 +389,7 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	parts.sun_direct *= exp(-vec3(extinction) * (p.thickness / p.mu_v));
 #endif
 	parts.sky = max(vec3(textureLod(sky_total, air, 0.0)) - near, vec3(0.0)) * parts.transmittance;
-	parts.air = near * vec3(air_below) + (vec3(1.0) - to_layer) * vec3(air_around);
+	parts.air = near * (vec3(air_below) + view_air_beside(parts.transmittance, p.half_angle, t)) + (vec3(1.0) - to_layer) * vec3(air_around);
 	parts.distance = p.thickness > 0.01 ? t : 0.0;
 	return parts;
 }

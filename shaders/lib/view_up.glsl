@@ -153,7 +153,7 @@ vec3 up_single(vec3 tau, float mu_l, float mu_v, vec3 along_light, vec3 along_vi
 // Thickness evened out over the way that light goes sideways, m. octaves: by which the footprint is larger than a texel of it.
 float up_smooth_thickness_at(vec2 place, float octaves)
 {
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	vec2 uv = field_place(place) / cloud_layer.z;
 #ifdef FIELD_NEAR
 	return packed_linear(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), 0.0);
 #else
@@ -206,7 +206,9 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec3 received = vec3(textureLod(cloud_received, ray.place / cloud_layer.z, 0.0));
 	vec3 diffuse = to_layer * (vec3(sky_irradiance_cloud) * light.w + received * (1.0 - light.w)) * (1.0 / PI);
 	vec3 met = vec3(1.0) - along_view;
-	vec3 radiance = vec3(near) + vec3(sky) * along_view + met * diffuse +
+	vec3 clear = (vec3(near) - (vec3(1.0) - to_layer) * vec3(air_around)) / max(vec3(air_below), vec3(1e-4)); // what was tabled, without clouds
+	vec3 beside = clear * view_air_beside(along_view, half_angle, ray.distance);
+	vec3 radiance = vec3(near) + beside + vec3(sky) * along_view + met * diffuse +
 	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * vec3(light));
 #ifndef FIELD_NEAR
 #if VIEW_LARGE_SUN

@@ -372,7 +372,7 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 	// Nothing stands so high around here: on to where it might, or to where the search expects cloud.
 	int part = path_part_at(path.arc / path.reach);
 	bool empty = over > 1.0 && !(searches && path_part_cloudy(path.cloudy, part));
-	float reach = cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
+	float reach = field_warp_reach(vec2(path.place) / cloud_layer.z) * cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
 	float t = -log(path_random(path)) / largest;
 	if (empty) {
 		t = mu < 0.0 ? min(reach, over / -mu) : reach;

@@ -22,6 +22,7 @@
 	X(cloud_layer)                                                                                                                     \
 	X(cloud_field)                                                                                                                     \
 	X(cloud_drift)                                                                                                                     \
+	X(cloud_warp)                                                                                                                      \
 	X(cloud_puffs)                                                                                                                     \
 	X(cloud_puffs_drift)                                                                                                               \
 	X(cloud_detail)                                                                                                                    \

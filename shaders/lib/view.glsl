@@ -148,7 +148,10 @@ vec3 view_ground(vec3 direction, float high, ground_point point)
 	sea_slopes slopes = sea_slopes_at(point.offset, heading, point.across, point.across / point.mu_v);
 	return ground_patch.y * sea_radiance(slopes, to_viewer, to_sun, lit.beam, lit.received);
 #else
-	vec2 detail = ground_detail(point);
+	vec3 detail = ground_detail(point);
+#if VIEW_GROUND == 1
+	lit.reflectance *= vec3(1.0) + GROUND_DRIER * detail.z;
+#endif
 	return lit.reflectance * (lit.received + lit.beam * (max(mu_sun, 0.0) * detail.x)) * (detail.y / PI);
 #endif
 }

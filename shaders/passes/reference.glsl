@@ -275,7 +275,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float footprint = path.first ? camera_position.w * t * pow(mu_v, -0.75) : 20.0;
 	bool again = !path.first;
 	path.grounded = path.first ? 2 : max(path.grounded, 1);
-	vec2 detail = vec2(1.0);
+	vec3 detail = vec3(1.0, 1.0, 0.0);
 	vec2 there = vec2(path.place) + vec2(camera_position);
 	ground_point point;
 	point.offset = vec2(path.place);
@@ -293,6 +293,9 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 #else
 	vec3 reflectance = ground_reflectance(there, footprint);
 #endif
+#endif
+#if VIEW_GROUND == 1
+	reflectance *= vec3(1.0) + GROUND_DRIER * detail.z;
 #endif
 	reference_first(path, sums, 1, vec3(0.0));
 #if VIEW_GROUND == 2

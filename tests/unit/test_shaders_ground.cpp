@@ -332,11 +332,17 @@ static void set_ground(double contrast, double slope, double stretch, double sun
 	glsl::camera_position = vec4(3000.0f, 4000.0f, 2.0f, 1.5e-3f);
 }
 
-/* Means of both factors over a ring of the ground, 1 wherever it lies and however low the sun. */
-template <typename Point, typename Detail> static void mean_detail(double distance, double sun_elevation, Detail detail, double mean[2])
+/* Of what the ground close by is multiplied with, over a ring of it. */
+struct detail_figures {
+	double beam, light, drier; /* means */
+	double contrast;           /* deviation of `light` */
+};
+
+template <typename Point, typename Detail> static detail_figures figures_of(double distance, double sun_elevation, Detail detail)
 {
 	enum { PLACES = 20000 };
-	mean[0] = mean[1] = 0;
+	detail_figures f = {};
+	double square = 0;
 	for (int i = 0; i < PLACES; i++) {
 		const double u = i * 0.7548776662, v = i * 0.5698402910;
 		const double azimuth = 2 * pi * (u - std::floor(u)), t = distance * (1 + 0.5 * (v - std::floor(v)));
@@ -348,31 +354,53 @@ template <typename Point, typename Detail> static void mean_detail(double distan
 		p.across = (float)(1.5e-3 * t);
 		p.mu_v = (float)(2 / std::hypot(t, 2.0));
 		p.mu_sun = (float)std::sin(sun_elevation * pi / 180);
-		const vec2 found = detail(p);
-		mean[0] += (double)found.x / PLACES;
-		mean[1] += (double)found.y / PLACES;
+		const vec3 found = detail(p);
+		f.beam += (double)found.x / PLACES;
+		f.light += (double)found.y / PLACES;
+		f.drier += (double)found.z / PLACES;
+		square += (double)found.y * (double)found.y / PLACES;
 	}
+	f.contrast = std::sqrt(square - f.light * f.light);
+	return f;
 }
 
+static detail_figures figures_of_bare(double distance, double sun_elevation)
+{
+	set_ground(0.16, 0.16, 1, sun_elevation);
+	return figures_of<ground_point>(distance, sun_elevation, [](const ground_point &p) { return ground_detail(p); });
+}
+
+static detail_figures figures_of_grown(double distance, double sun_elevation)
+{
+	using glsl::grown::ground_point;
+	set_ground(0.32, 0, 1, sun_elevation);
+	return figures_of<ground_point>(distance, sun_elevation, [](const ground_point &p) { return glsl::grown::ground_detail(p); });
+}
+
+/* The published albedos stay what they are, wherever the ring lies and however low the sun. */
 static void detail_changes_no_mean(void **)
 {
 	for (double distance = 3; distance < 5000; distance *= 6)
 		for (double elevation = 3; elevation < 90; elevation *= 3) {
-			double bare[2], grown[2];
-			set_ground(0.16, 0.16, 1, elevation);
-			mean_detail<ground_point>(
-				distance, elevation, [](const ground_point &p) { return ground_detail(p); }, bare);
-			set_ground(0.32, 0, 1, elevation);
-			mean_detail<glsl::grown::ground_point>(
-				distance, elevation, [](const glsl::grown::ground_point &p) { return glsl::grown::ground_detail(p); },
-				grown);
-			print_message("%6.0f m, sun %2.0f degrees: bare %.3f, %.3f; grown %.3f, %.3f\n", distance, elevation, bare[0],
-				      bare[1], grown[0], grown[1]);
-			for (int k = 0; k < 2; k++) {
-				assert_float_equal(bare[k], 1, 0.03);
-				assert_float_equal(grown[k], 1, 0.03);
-			}
+			const detail_figures bare = figures_of_bare(distance, elevation), grown = figures_of_grown(distance, elevation);
+			print_message("%6.0f m, sun %2.0f degrees: bare %.3f, %.3f; grown %.3f, drier by %.3f\n", distance, elevation,
+				      bare.beam, bare.light, grown.light, grown.drier);
+			assert_float_equal(bare.beam, 1, 0.03);
+			assert_float_equal(bare.light, 1, 0.03);
+			assert_float_equal(grown.beam, 1, 1e-6);
+			assert_float_equal(grown.light, 1, 0.03);
+			assert_float_equal(grown.drier, 0, 0.02);
 		}
+}
+
+/* Tufts are large against a pixel close by and small far away, where a pixel is the mean of many: what grows looks ever smoother. */
+static void grass_is_smooth_far_away(void **)
+{
+	const double close = figures_of_grown(10, 40).contrast, middle = figures_of_grown(100, 40).contrast,
+		     far = figures_of_grown(1000, 40).contrast;
+	print_message("contrast of grass at 10, 100, 1000 m: %.3f, %.3f, %.3f\n", close, middle, far);
+	assert_true(close > 0.15 && close < 0.5);
+	assert_true(middle < 0.8 * close && far < 0.6 * middle);
 }
 
 int main()
@@ -390,6 +418,7 @@ int main()
 		cmocka_unit_test(glitter_is_the_same_from_any_distance),
 		cmocka_unit_test(ground_noise_is_normalised),
 		cmocka_unit_test(detail_changes_no_mean),
+		cmocka_unit_test(grass_is_smooth_far_away),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

@@ -96,9 +96,9 @@ void view_add_lit(vec4 lit_painted, float footprint, vec3 sun, float share, INOU
 	lit.beam += share * beam;
 	lit.received += share * received;
 #if VIEW_GROUND == 3
-	lit.reflectance += share * ground_ice(ground_reflectance(vec2(lit_painted.z, lit_painted.w), footprint), footprint);
+	lit.reflectance += share * ground_ice(ground_reflectance_seen(vec2(lit_painted.z, lit_painted.w), footprint), footprint);
 #elif VIEW_GROUND != 2
-	lit.reflectance += share * ground_reflectance(vec2(lit_painted.z, lit_painted.w), footprint);
+	lit.reflectance += share * ground_reflectance_seen(vec2(lit_painted.z, lit_painted.w), footprint);
 #endif
 }
 

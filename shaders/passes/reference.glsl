@@ -283,15 +283,15 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	point.mu_v = mu_v;
 	point.mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
 #if VIEW_GROUND == 2
-	vec3 reflectance = ground_reflectance(there, footprint);
+	vec3 reflectance = ground_reflectance_seen(there, footprint);
 #else
 	// What the camera itself sees has all that the slab's view shows of it.
 	if (path.first)
 		detail = ground_detail(point);
 #if VIEW_GROUND == 3
-	vec3 reflectance = ground_ice(ground_reflectance(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
+	vec3 reflectance = ground_ice(ground_reflectance_seen(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
 #else
-	vec3 reflectance = ground_reflectance(there, footprint);
+	vec3 reflectance = ground_reflectance_seen(there, footprint);
 #endif
 #endif
 #if VIEW_GROUND == 1

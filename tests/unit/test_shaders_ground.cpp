@@ -1,4 +1,4 @@
-/* The sea and the ground close by: Fresnel, slopes, glitter and waves against closed forms and published values, compiled for the
+/* The sea and the ground as they are seen: Fresnel, slopes, glitter and waves against closed forms and published values, compiled for the
  * processor. No OpenGL. */
 extern "C" {
 #include "renderer/scene.h"
@@ -19,6 +19,7 @@ namespace glsl
 {
 namespace bare
 {
+#include "shaders/lib/ground.glsl"
 #include "shaders/lib/ground_near.glsl"
 #include "shaders/lib/sea.glsl"
 } // namespace bare
@@ -403,6 +404,51 @@ static void grass_is_smooth_far_away(void **)
 	assert_true(middle < 0.8 * close && far < 0.6 * middle);
 }
 
+/* --- regions ------------------------------------------------------------------------------------------------------------------ */
+
+static void home_shows_the_picture_as_it_is(void **)
+{
+	for (int i = 0; i < 20000; i++) {
+		const double u = i * 0.7548776662, v = i * 0.5698402910;
+		const vec2 place((float)(u - std::floor(u)) - 0.25f, (float)(v - std::floor(v)) - 0.25f);
+		assert_float_equal(glm::length(ground_region_at(place) - vec3(place, 0.0f)), 0, 1e-6);
+	}
+}
+
+/* How alike the picture and the one a whole number of pictures away look, by the correlation of a pattern that repeats with the picture: 1
+ * where it only repeats, as it did. The share of any part of the picture in what is seen stays what it is. */
+static void picture_is_not_seen_to_repeat(void **)
+{
+	enum { SIDE = 160, PLACES = 12 * SIDE };
+	static double pattern[PLACES][SIDE];
+	double mean = 0, square = 0, tone = 0, tone_square = 0;
+	for (int x = 0; x < PLACES; x++)
+		for (int y = 0; y < SIDE; y++) {
+			const vec3 at = ground_region_at(vec2(20.0f + (float)x / SIDE, 7.0f + (float)y / SIDE));
+			pattern[x][y] = std::cos(2 * pi * (double)(3 * at.x + at.y)) + std::cos(2 * pi * (double)(2 * at.y - at.x));
+			mean += pattern[x][y] / (PLACES * SIDE);
+			square += pattern[x][y] * pattern[x][y] / (PLACES * SIDE);
+			tone += (double)at.z / (PLACES * SIDE);
+			tone_square += (double)at.z * (double)at.z / (PLACES * SIDE);
+		}
+	print_message("pattern: mean %.3f, variance %.3f; tone: mean %.3f, variance %.3f\n", mean, square, tone, tone_square);
+	assert_float_equal(mean, 0, 0.1);
+	assert_float_equal(square, 1, 0.1);
+	assert_float_equal(tone, 0, 0.15);
+	assert_float_equal(tone_square, 1, 0.3);
+	double all = 0;
+	for (int away = 1; away < 12; away++) {
+		double sum = 0;
+		for (int x = 0; x + away * SIDE < PLACES; x++)
+			for (int y = 0; y < SIDE; y++)
+				sum += pattern[x][y] * pattern[x + away * SIDE][y] / square / ((PLACES - away * SIDE) * SIDE);
+		print_message("%2d pictures away: correlation %.3f\n", away, sum);
+		assert_true(std::fabs(sum) < 0.5);
+		all += std::fabs(sum) / 11;
+	}
+	assert_true(all < 0.2);
+}
+
 int main()
 {
 	const CMUnitTest tests[] = {
@@ -419,6 +465,8 @@ int main()
 		cmocka_unit_test(ground_noise_is_normalised),
 		cmocka_unit_test(detail_changes_no_mean),
 		cmocka_unit_test(grass_is_smooth_far_away),
+		cmocka_unit_test(home_shows_the_picture_as_it_is),
+		cmocka_unit_test(picture_is_not_seen_to_repeat),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

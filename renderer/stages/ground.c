@@ -103,12 +103,12 @@ static double picture_side_of(const struct scene *scene)
 }
 
 /* Regions as shaders/lib/ground.glsl has them: home in pictures, its middle and how far from it no border comes. */
-static const double home_middle = 0.25, home_sure = 0.5;
+static const double home_middle = 0.25, home_sure = 0.55;
 
-/* Does the camera see ground beyond what surely is at home? Nothing of maps and of what is uniform is rearranged. */
-static bool sees_regions(const struct scene *scene, double side)
+bool ground_has_regions(const struct scene *scene)
 {
-	const double *position = scene->camera.position_m, h = position[2], reach = sqrt(h * (2 * 6371000.0 + h));
+	const double side = picture_side_of(scene), *position = scene->camera.position_m, h = position[2],
+		     reach = sqrt(h * (2 * 6371000.0 + h));
 	const double away = fmax(fabs(position[0] - home_middle * side), fabs(position[1] - home_middle * side));
 	return types[scene->ground.type].picture && !scene->ground.map.map && away + reach > home_sure * side;
 }
@@ -128,7 +128,7 @@ static void fill_block(struct scene_block *block, const struct scene *scene, int
 	block->ground_mean_albedo[3] = (float)picture;
 	for (int axis = 0; axis < 2; axis++)
 		block->ground_region[axis] = (float)round(floor(scene->camera.position_m[axis] / tile) * tile / picture);
-	block->ground_region[2] = sees_regions(scene, picture);
+	block->ground_region[2] = ground_has_regions(scene);
 	block->ground_patch[0] = (float)side;
 	block->ground_patch[1] =
 		(float)(scene->ground.type == GROUND_SEA ? scene->ground.albedo_scale : types[scene->ground.type].contrast);

@@ -2,6 +2,7 @@
 
 #include "renderer/log.h"
 #include "renderer/stages/colour.h"
+#include "renderer/stages/ground.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -40,16 +41,30 @@ enum view_ground view_ground_of(const struct scene *scene)
 	return grounds[scene->ground.type];
 }
 
+/* Metres a pixel in which nothing is seen any more of what shaders/lib/ground_near.glsl leaves out then: tufts, and the finest of the
+ * ragged edges of ice. Pixels are smallest below the camera. */
+static const double near_end_m[VIEW_GROUNDS] = {[VIEW_GROWN] = 0.6, [VIEW_ICE] = 6};
+
+static enum view_reach reach_of_scene(const struct scene *scene)
+{
+	const struct camera_view view = camera_view_of(scene, 0);
+	if (!ground_has_regions(scene))
+		return VIEW_NEAR;
+	const double pixel = camera_pixel_angle(&view) * scene->camera.position_m[2];
+	return pixel < near_end_m[view_ground_of(scene)] ? VIEW_NEAR_AND_FAR : VIEW_FAR;
+}
+
 struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
-	char defines[320];
+	char defines[384];
 	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
-		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n",
+		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n"
+		 "#define VIEW_GROUND_REGIONS %d\n#define VIEW_GROUND_CLOSE %d\n",
 		 sides[variant->side].defines, variant->packed ? "#define FIELD_PACKED 1\n" : "", variant->region,
 		 variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers, variant->projection, variant->large_sun,
-		 variant->ground);
+		 variant->ground, variant->reach != VIEW_NEAR, variant->reach != VIEW_FAR);
 	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
 	if (variant->ground == VIEW_SEA)
 		desc.samplers[GROUND_SAMPLER] = "sea_sky";
@@ -60,7 +75,7 @@ struct pass *view_create_pass(const struct pass_compiler *compiler, const char *
 static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
 	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region]
-					   [variant->projection][variant->large_sun][variant->packed][variant->ground];
+					   [variant->projection][variant->large_sun][variant->packed][variant->ground][variant->reach];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
@@ -87,7 +102,7 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	view_up_finish(&stage->up);
@@ -453,13 +468,15 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 	const enum view_side side = side_of(scene, inputs);
 	const enum view_ground ground = view_ground_of(scene);
 	if (side == VIEW_CLEAR)
-		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground};
+		return (struct view_variant){
+			.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground, .reach = reach_of_scene(scene)};
 	return (struct view_variant){.side = side,
 				     .shading = scene->model.shading,
 				     .twilight = context->block.slab_light[1] > 0,
 				     .layers = layers,
 				     .packed = side == VIEW_BELOW && inputs->field->coarse_packed,
-				     .ground = ground};
+				     .ground = ground,
+				     .reach = reach_of_scene(scene)};
 }
 
 /* The picture with so many rays a side of a pixel. */

@@ -22,6 +22,9 @@ enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 /* What the ground is close by. The numbers stand in shaders/lib/ground.glsl. */
 enum view_ground { VIEW_BARE, VIEW_GROWN, VIEW_SEA, VIEW_ICE, VIEW_GROUNDS };
 
+/* How much of the ground is seen: what lies close by, the regions that the far ground is made of (shaders/lib/ground.glsl), or both. */
+enum view_reach { VIEW_NEAR, VIEW_NEAR_AND_FAR, VIEW_FAR, VIEW_REACHES };
+
 /* The view pass exists in many forms, since software renderers execute both sides of every branch. */
 struct view_variant {
 	enum view_side side;
@@ -32,14 +35,15 @@ struct view_variant {
 	enum projection projection; /* of a camera_view */
 	bool large_sun;             /* sun_disc.large */
 	enum view_ground ground;
+	enum view_reach reach;
 	bool packed; /* the field, from below */
 };
 
 struct view_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	/* By shading, side, twilight, layers, region, projection, large sun, packed, ground. Those that most pictures need are made at the
-	 * start, the others with the first picture that wants them. */
-	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][2][VIEW_GROUNDS];
+	/* By shading, side, twilight, layers, region, projection, large sun, packed, ground, reach. Those that most pictures need are made
+	 * at the start, the others with the first picture that wants them. */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][2][VIEW_GROUNDS][VIEW_REACHES];
 	struct view_up_stage up;
 	struct height_view_stage height;
 	struct view_samples_stage samples;

@@ -7,6 +7,11 @@
 #include "shaders/lib/ground_lattice.glsl"
 #include "shaders/lib/slopes.glsl"
 
+// Decided when the shader is built: are pixels anywhere so small that tufts, or the finest of ragged edges, are seen (renderer/stages/view.c)?
+#ifndef VIEW_GROUND_CLOSE
+#define VIEW_GROUND_CLOSE 1
+#endif
+
 // What a pixel sees of the ground.
 struct ground_point {
 	vec2 offset;  // from the camera's foot, m
@@ -61,6 +66,7 @@ vec3 ground_detail(ground_point p)
 // What grows is patches that differ in tone and colour, seen foreshortened, and on them what stands up: at a slant, tufts one behind the other. Rows of these stand across the view
 // (nearly: in one of eight directions, on lattices of the world), as far apart as shows a part of each over the one before it.
 const float GROUND_TUFT = 0.22; // m across, the smallest; farther away several are one
+const float GROUND_TUFTS_END = 0.6; // m a pixel, in which none is seen any more
 const float GROUND_BLADES = 10.0; // in a tuft; likewise, lest they be smaller than pixels
 
 // What a patch, or a blade, is brighter by where it is drier (shaders/lib/ground_paint.glsl, dry grass over green).
@@ -95,8 +101,8 @@ vec2 ground_row(ground_rows rows, int row, float along, float rise)
 	return vec2(height, 0.45 * tuft.y + 0.75 * blade.y + 1.5 * (rise / height - 0.635));
 }
 
-// Tone of what stands up, of deviation about 1. fray: noise that borders between tufts of one size or direction and the next are frayed by.
-float ground_tufts(ground_point p, vec3 fray, INOUT(float) width)
+// Tone of what stands up, of deviation about 1 where tufts are of their own size. fray: noise that borders between tufts of one size or direction and the next are frayed by.
+float ground_tufts(ground_point p, vec3 fray)
 {
 	float heading = floor(atan(p.offset.x, p.offset.y) * (8.0 / PI) + 0.5 + 0.15 * fray.y) * (PI / 8.0);
 	vec2 forth = vec2(sin(heading), cos(heading));
@@ -106,7 +112,7 @@ float ground_tufts(ground_point p, vec3 fray, INOUT(float) width)
 	vec2 foot = vec2(dot(place, aside), dot(place, forth));
 	float coarseness = log2(max(p.across / GROUND_TUFT, 1e-4)) + 0.35 * fray.z;
 	float level = max(floor(coarseness + 2.6), 0.0);
-	width = GROUND_TUFT * exp2(level);
+	float width = GROUND_TUFT * exp2(level);
 	float spacing = width * exp2(ceil(log2(max(0.5 / p.mu_v, 1.0)) + 0.3 * fray.x));
 	float before = floor(foot.y / spacing);
 	float at = foot.y / spacing - before + offset.y / spacing + 0.5 * fray.y; // rows are bent, too
@@ -124,7 +130,7 @@ float ground_tufts(ground_point p, vec3 fray, INOUT(float) width)
 	float stands = nearest - (foot.y / spacing - before);
 	vec2 front = ground_row(rows, row - 1, aside_of_row * (stands - 1.0), rise + 1.0);
 	vec2 back = ground_row(rows, row, aside_of_row * stands, rise);
-	return mix(back.y, front.y, clamp((front.x - 1.0 - rise) * spacing * p.mu_v / p.across + 0.5, 0.0, 1.0));
+	return mix(back.y, front.y, clamp((front.x - 1.0 - rise) * spacing * p.mu_v / p.across + 0.5, 0.0, 1.0)) * sqrt(GROUND_TUFT / width);
 }
 
 // As for bare ground; z: how much drier than the mean.
@@ -149,8 +155,10 @@ vec3 ground_detail(ground_point p)
 	float shown = 0.7 / (1.0 + p.across / p.mu_v);
 	tone += shown * patches.z;
 	dry += shown * patches.x;
-	float width = 1.0;
-	float tufts = ground_tufts(p, patches, width) * (1.0 - smoothstep(0.4, 0.8, p.mu_v)) * sqrt(GROUND_TUFT / width);
+	float tufts = 0.0;
+#if VIEW_GROUND_CLOSE
+	tufts = ground_tufts(p, patches) * (1.0 - smoothstep(0.4, 0.8, p.mu_v)) * (1.0 - smoothstep(0.3 * GROUND_TUFTS_END, GROUND_TUFTS_END, p.across));
+#endif
 	return vec3(1.0, max(1.0 + ground_patch.y * (0.36 * tone + 0.9 * tufts), 0.15), 0.15 * dry + 0.1 * tufts);
 }
 #endif
@@ -163,10 +171,14 @@ vec2 ground_ragged(ground_point p)
 	float texel = ground_mean_albedo.w / ground_patch.x;
 	vec2 foot = vec2(camera_position.x, camera_position.y);
 	vec3 wide = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.9 * texel)), 64u);
-	vec3 narrow = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.23 * texel)), 65u);
 	// What is shorter than the pixel's strip would come out as dots.
 	float strip = p.across / (p.mu_v * texel);
-	return texel * (0.22 / (1.0 + 2.0 * strip * strip) * vec2(wide.x, wide.z) + 0.10 / (1.0 + 40.0 * strip * strip) * vec2(narrow.z, narrow.y));
+	vec2 moved = 0.22 / (1.0 + 2.0 * strip * strip) * vec2(wide.x, wide.z);
+#if VIEW_GROUND_CLOSE
+	vec3 narrow = ground_noise(ground_lattice_at(foot, p.offset, vec2(0.23 * texel)), 65u);
+	moved += 0.10 / (1.0 + 40.0 * strip * strip) * vec2(narrow.z, narrow.y);
+#endif
+	return texel * moved;
 }
 
 vec3 ground_ice(vec3 reflectance, float footprint)

@@ -264,19 +264,20 @@ static void bound_row(const struct camera_view *view, int row, double *lowest, d
 	}
 }
 
-/* What the rays of a row of pixels have in common, with a margin of two pixels. */
+/* What the rays of a row of pixels have in common, with a margin of two pixels above the horizon and, where strips of ground are long, four
+ * below (VIEW_STRIP_ROWS in shaders/lib/view.glsl). */
 static enum view_region region_of_row(const struct scene_block *block, const struct camera_view *view, enum view_side side, int row)
 {
-	const double margin = 2 * camera_pixel_angle(view) + 1e-6, ground = horizon_sine(block, 0);
+	const double pixel = camera_pixel_angle(view), ground = horizon_sine(block, 0);
 	/* From above, rays that miss the ground may still graze the layer. */
 	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
 	double lowest, highest;
 	if (view->projection == PROJECTION_FISHEYE)
 		return sky < -1e-6 ? VIEW_SKY : VIEW_MIXED; /* it ends at elevation 0 */
 	bound_row(view, row, &lowest, &highest);
-	if (lowest > sky + margin)
+	if (lowest > sky + 2 * pixel + 1e-6)
 		return VIEW_SKY;
-	return highest < ground - margin ? VIEW_GROUND : VIEW_MIXED;
+	return highest < ground - 4 * pixel - 1e-6 ? VIEW_GROUND : VIEW_MIXED;
 }
 
 /* Is no pixel of a row, all above the horizon, larger than half a texel of the field or a texel of the thickness evened out? */

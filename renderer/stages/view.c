@@ -27,9 +27,16 @@ static const struct {
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
 			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
-static const struct pass_desc develop_descs[2] = {
-	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 0\n", .outputs = 1, .samplers = {"picture"}},
-	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 1\n", .outputs = 1, .samplers = {"picture"}},
+/* By codes of 8 bits, and twice that by a round picture. */
+#define DEVELOP(defines_text)                                                                                                              \
+	{                                                                                                                                  \
+		.file = "shaders/passes/develop.glsl", .defines = defines_text, .outputs = 1, .samplers = { "picture" }                    \
+	}
+static const struct pass_desc develop_descs[VIEW_DEVELOPS] = {
+	DEVELOP("#define DEVELOP_NEAR 0\n#define DEVELOP_ROUND 0\n"),
+	DEVELOP("#define DEVELOP_NEAR 1\n#define DEVELOP_ROUND 0\n"),
+	DEVELOP("#define DEVELOP_NEAR 0\n#define DEVELOP_ROUND 1\n"),
+	DEVELOP("#define DEVELOP_NEAR 1\n#define DEVELOP_ROUND 1\n"),
 };
 
 /* Of what lies close by (shaders/lib/ground.glsl). */
@@ -85,7 +92,7 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 {
 	stage->compiler = *compiler;
 	view_samples_init(&stage->samples, compiler);
-	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, 2) && view_up_init(&stage->up, compiler) &&
+	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, VIEW_DEVELOPS) && view_up_init(&stage->up, compiler) &&
 		  height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
@@ -106,7 +113,7 @@ void view_stage_finish(struct view_stage *stage)
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	view_up_finish(&stage->up);
-	stage_destroy_passes(stage->develop, 2);
+	stage_destroy_passes(stage->develop, VIEW_DEVELOPS);
 	texture_finish(&stage->spare);
 	disc_buffer_finish(&stage->disc);
 	height_view_finish(&stage->height);
@@ -609,7 +616,8 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	return ok;
 }
 
-void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)
+void view_develop(const struct view_stage *stage, const struct texture *picture, bool round_picture, struct texture *target)
 {
-	pass_run(stage->develop[target->format == TEXTURE_RGBA8], &(struct pass_run){.targets = &target, .samplers = {picture}});
+	pass_run(stage->develop[(target->format == TEXTURE_RGBA8) + 2 * round_picture],
+		 &(struct pass_run){.targets = &target, .samplers = {picture}});
 }

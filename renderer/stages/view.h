@@ -22,6 +22,8 @@ enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 /* What the ground is close by. The numbers stand in shaders/lib/ground.glsl. */
 enum view_ground { VIEW_BARE, VIEW_GROWN, VIEW_SEA, VIEW_ICE, VIEW_GROUNDS };
 
+enum { VIEW_DEVELOPS = 4 };
+
 /* How much of the ground is seen: what lies close by, the regions that the far ground is made of (shaders/lib/ground.glsl), or both. */
 enum view_reach { VIEW_NEAR, VIEW_NEAR_AND_FAR, VIEW_FAR, VIEW_REACHES };
 
@@ -47,10 +49,10 @@ struct view_stage {
 	struct view_up_stage up;
 	struct height_view_stage height;
 	struct view_samples_stage samples;
-	struct pass *develop[2];       /* into codes of 16 and of 8 bits */
-	struct texture spare;          /* of a picture that was dropped, to be used again; may be none */
-	struct disc_buffer disc;       /* of the last picture made */
-	renderer_cancelled *cancelled; /* of the picture being made; may be NULL */
+	struct pass *develop[VIEW_DEVELOPS]; /* into codes of 16 and of 8 bits, of a picture with corners and of a round one */
+	struct texture spare;                /* of a picture that was dropped, to be used again; may be none */
+	struct disc_buffer disc;             /* of the last picture made */
+	renderer_cancelled *cancelled;       /* of the picture being made; may be NULL */
 	void *cancel_context;
 };
 
@@ -91,7 +93,8 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 				    bool layers);
 void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *inputs);
 
-/* Exposure, tone and sRGB of a picture into `target` (RGBA8 or RGBA16). Reads the block's develop member. */
-void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target);
+/* Exposure, tone and sRGB of a picture into `target` (RGBA8 or RGBA16). Of a round one, a fisheye, the edge of the circle is softened over
+ * a pixel, which the picture itself is not, since its pixels are radiances. Reads the block's develop member. */
+void view_develop(const struct view_stage *stage, const struct texture *picture, bool round_picture, struct texture *target);
 
 #endif

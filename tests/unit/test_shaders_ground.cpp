@@ -298,6 +298,52 @@ static void glitter_is_the_same_from_any_distance(void **)
 			}
 }
 
+/* From some kilometres up only the longest waves are longer than pixels, a few that stand out as stripes: they are roughness by then. */
+static void far_sea_has_no_stripes(void **)
+{
+	enum { PLACES = 4000 };
+	glsl::set_scene_block(waves_of(8, 0, 0));
+	for (double pixel = 5; pixel < 30; pixel *= 1.7) {
+		double square = 0;
+		for (int i = 0; i < PLACES; i++) {
+			const double u = i * 0.7548776662, v = i * 0.5698402910;
+			const vec2 place((float)(9000 * (u - std::floor(u))), (float)(9000 * (v - std::floor(v))));
+			const vec2 slope = sea_slopes_at(place, vec2(0, 1), (float)pixel, (float)(1.5 * pixel)).resolved;
+			square += (double)glm::dot(slope, slope) / PLACES;
+		}
+		const double share = square / (0.003 + 5.08e-3 * 8);
+		print_message("pixel %4.1f m: resolved share of the slopes' variance %.4f\n", pixel, share);
+		assert_true(share < 0.004);
+	}
+}
+
+/* Across the glitter seen from 4 km the mean over gusts is Cox and Munk's, and it breaks up: at its flanks light changes from place to
+ * place by more than in its middle. */
+static void glitter_breaks_up_at_its_edges(void **)
+{
+	enum { PLACES = 20000 };
+	glsl::set_scene_block(waves_of(8, 0, 0));
+	const sea_slopes rough = sea_slopes_at(vec2(0.0f), vec2(0, 1), 1e7f, 1e7f);
+	const vec3 to_viewer = direction(50, 0);
+	double deviation[7];
+	for (int k = 0; k < 7; k++) {
+		const vec3 to_sun = direction(50, 180 - 10 * k);
+		const double wanted = (double)sea_glint(rough, to_viewer, to_sun);
+		double mean = 0, square = 0;
+		for (int i = 0; i < PLACES; i++) {
+			const double u = i * 0.7548776662, v = i * 0.5698402910;
+			const vec2 place((float)(40000 * (u - std::floor(u))), (float)(40000 * (v - std::floor(v))));
+			const double found = (double)sea_glint(sea_slopes_at(place, vec2(0, 1), 6.0f, 10.0f), to_viewer, to_sun);
+			mean += found / PLACES;
+			square += found * found / PLACES;
+		}
+		deviation[k] = std::sqrt(square - mean * mean) / mean;
+		print_message("%2d degrees aside: %.5f, Cox and Munk %.5f, deviation %.3f\n", 10 * k, mean, wanted, deviation[k]);
+		assert_float_equal(mean, wanted, 0.06 * wanted + 1e-4);
+	}
+	assert_true(deviation[0] < 0.2 && deviation[4] > 1.2 * deviation[0]);
+}
+
 /* --- the ground close by ---------------------------------------------------------------------------------------------------------- */
 
 static void ground_noise_is_normalised(void **)
@@ -462,6 +508,8 @@ int main()
 		cmocka_unit_test(waves_run_as_on_deep_water),
 		cmocka_unit_test(waves_are_as_high_as_the_wind_makes_them),
 		cmocka_unit_test(glitter_is_the_same_from_any_distance),
+		cmocka_unit_test(far_sea_has_no_stripes),
+		cmocka_unit_test(glitter_breaks_up_at_its_edges),
 		cmocka_unit_test(ground_noise_is_normalised),
 		cmocka_unit_test(detail_changes_no_mean),
 		cmocka_unit_test(grass_is_smooth_far_away),

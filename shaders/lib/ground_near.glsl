@@ -72,6 +72,13 @@ const float GROUND_BLADES = 10.0; // in a tuft; likewise, lest they be smaller t
 // What a patch, or a blade, is brighter by where it is drier (shaders/lib/ground_paint.glsl, dry grass over green).
 const vec3 GROUND_DRIER = vec3(0.9, 0.2, 0.45);
 
+// Reflectance where it is so much drier than the mean. What is not green, as soil, hardly changes its colour.
+vec3 ground_drier(vec3 reflectance, float drier)
+{
+	float green = clamp(reflectance.y / max(reflectance.x, 1e-4) - 0.5, 0.0, 1.0);
+	return reflectance * (vec3(1.0) + GROUND_DRIER * (green * drier));
+}
+
 // One row's tufts at a place along it, in tufts. x: height 0..1, y: tone -1..1.
 vec2 ground_tuft(float base, float inside, int row, uint seed)
 {

@@ -169,7 +169,7 @@ vec3 view_ground(vec3 direction, float high, ground_point point)
 #else
 	vec3 detail = ground_detail(point);
 #if VIEW_GROUND == 1
-	lit.reflectance *= vec3(1.0) + GROUND_DRIER * detail.z;
+	lit.reflectance = ground_drier(lit.reflectance, detail.z);
 #endif
 	return lit.reflectance * (lit.received + lit.beam * (max(mu_sun, 0.0) * detail.x)) * (detail.y / PI);
 #endif

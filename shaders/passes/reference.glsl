@@ -295,7 +295,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 #endif
 #endif
 #if VIEW_GROUND == 1
-	reflectance *= vec3(1.0) + GROUND_DRIER * detail.z;
+	reflectance = ground_drier(reflectance, detail.z);
 #endif
 	reference_first(path, sums, 1, vec3(0.0));
 #if VIEW_GROUND == 2

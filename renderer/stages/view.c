@@ -2,6 +2,7 @@
 
 #include "renderer/log.h"
 #include "renderer/stages/colour.h"
+#include "renderer/stages/ground.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -26,9 +27,16 @@ static const struct {
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
 			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
-static const struct pass_desc develop_descs[2] = {
-	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 0\n", .outputs = 1, .samplers = {"picture"}},
-	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 1\n", .outputs = 1, .samplers = {"picture"}},
+/* By codes of 8 bits, and twice that by a round picture. */
+#define DEVELOP(defines_text)                                                                                                              \
+	{                                                                                                                                  \
+		.file = "shaders/passes/develop.glsl", .defines = defines_text, .outputs = 1, .samplers = { "picture" }                    \
+	}
+static const struct pass_desc develop_descs[VIEW_DEVELOPS] = {
+	DEVELOP("#define DEVELOP_NEAR 0\n#define DEVELOP_ROUND 0\n"),
+	DEVELOP("#define DEVELOP_NEAR 1\n#define DEVELOP_ROUND 0\n"),
+	DEVELOP("#define DEVELOP_NEAR 0\n#define DEVELOP_ROUND 1\n"),
+	DEVELOP("#define DEVELOP_NEAR 1\n#define DEVELOP_ROUND 1\n"),
 };
 
 /* Of what lies close by (shaders/lib/ground.glsl). */
@@ -40,16 +48,30 @@ enum view_ground view_ground_of(const struct scene *scene)
 	return grounds[scene->ground.type];
 }
 
+/* Metres a pixel in which nothing is seen any more of what shaders/lib/ground_near.glsl leaves out then: tufts, and the finest of the
+ * ragged edges of ice. Pixels are smallest below the camera. */
+static const double near_end_m[VIEW_GROUNDS] = {[VIEW_GROWN] = 0.6, [VIEW_ICE] = 6};
+
+static enum view_reach reach_of_scene(const struct scene *scene)
+{
+	const struct camera_view view = camera_view_of(scene, 0);
+	if (!ground_has_regions(scene))
+		return VIEW_NEAR;
+	const double pixel = camera_pixel_angle(&view) * scene->camera.position_m[2];
+	return pixel < near_end_m[view_ground_of(scene)] ? VIEW_NEAR_AND_FAR : VIEW_FAR;
+}
+
 struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
-	char defines[320];
+	char defines[384];
 	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
-		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n",
+		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n"
+		 "#define VIEW_GROUND_REGIONS %d\n#define VIEW_GROUND_CLOSE %d\n",
 		 sides[variant->side].defines, variant->packed ? "#define FIELD_PACKED 1\n" : "", variant->region,
 		 variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers, variant->projection, variant->large_sun,
-		 variant->ground);
+		 variant->ground, variant->reach != VIEW_NEAR, variant->reach != VIEW_FAR);
 	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
 	if (variant->ground == VIEW_SEA)
 		desc.samplers[GROUND_SAMPLER] = "sea_sky";
@@ -60,7 +82,7 @@ struct pass *view_create_pass(const struct pass_compiler *compiler, const char *
 static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
 	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region]
-					   [variant->projection][variant->large_sun][variant->packed][variant->ground];
+					   [variant->projection][variant->large_sun][variant->packed][variant->ground][variant->reach];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
@@ -70,7 +92,7 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 {
 	stage->compiler = *compiler;
 	view_samples_init(&stage->samples, compiler);
-	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, 2) && view_up_init(&stage->up, compiler) &&
+	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, VIEW_DEVELOPS) && view_up_init(&stage->up, compiler) &&
 		  height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
@@ -87,11 +109,11 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	view_up_finish(&stage->up);
-	stage_destroy_passes(stage->develop, 2);
+	stage_destroy_passes(stage->develop, VIEW_DEVELOPS);
 	texture_finish(&stage->spare);
 	disc_buffer_finish(&stage->disc);
 	height_view_finish(&stage->height);
@@ -266,19 +288,20 @@ static void bound_row(const struct camera_view *view, int row, double *lowest, d
 	}
 }
 
-/* What the rays of a row of pixels have in common, with a margin of two pixels. */
+/* What the rays of a row of pixels have in common, with a margin of two pixels above the horizon and, where strips of ground are long, four
+ * below (VIEW_STRIP_ROWS in shaders/lib/view.glsl). */
 static enum view_region region_of_row(const struct scene_block *block, const struct camera_view *view, enum view_side side, int row)
 {
-	const double margin = 2 * camera_pixel_angle(view) + 1e-6, ground = horizon_sine(block, 0);
+	const double pixel = camera_pixel_angle(view), ground = horizon_sine(block, 0);
 	/* From above, rays that miss the ground may still graze the layer. */
 	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
 	double lowest, highest;
 	if (view->projection == PROJECTION_FISHEYE)
 		return sky < -1e-6 ? VIEW_SKY : VIEW_MIXED; /* it ends at elevation 0 */
 	bound_row(view, row, &lowest, &highest);
-	if (lowest > sky + margin)
+	if (lowest > sky + 2 * pixel + 1e-6)
 		return VIEW_SKY;
-	return highest < ground - margin ? VIEW_GROUND : VIEW_MIXED;
+	return highest < ground - 4 * pixel - 1e-6 ? VIEW_GROUND : VIEW_MIXED;
 }
 
 /* Is no pixel of a row, all above the horizon, larger than half a texel of the field or a texel of the thickness evened out? */
@@ -474,13 +497,15 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 	const enum view_side side = side_of(scene, inputs);
 	const enum view_ground ground = view_ground_of(scene);
 	if (side == VIEW_CLEAR)
-		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground};
+		return (struct view_variant){
+			.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground, .reach = reach_of_scene(scene)};
 	return (struct view_variant){.side = side,
 				     .shading = scene->model.shading,
 				     .twilight = context->block.slab_light[1] > 0,
 				     .layers = layers,
 				     .packed = side == VIEW_BELOW && inputs->field->coarse_packed,
-				     .ground = ground};
+				     .ground = ground,
+				     .reach = reach_of_scene(scene)};
 }
 
 /* The picture with so many rays a side of a pixel. */
@@ -612,7 +637,8 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	return ok;
 }
 
-void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)
+void view_develop(const struct view_stage *stage, const struct texture *picture, bool round_picture, struct texture *target)
 {
-	pass_run(stage->develop[target->format == TEXTURE_RGBA8], &(struct pass_run){.targets = &target, .samplers = {picture}});
+	pass_run(stage->develop[(target->format == TEXTURE_RGBA8) + 2 * round_picture],
+		 &(struct pass_run){.targets = &target, .samplers = {picture}});
 }

@@ -79,8 +79,8 @@ struct view_lit {
 	vec3 reflectance;
 };
 
-// lit_painted: the place that light comes to, and the one whose paint shows there.
-void view_add_lit(vec4 lit_painted, float footprint, vec3 sun, float share, INOUT(view_lit) lit)
+// lit_painted: the place that light comes to, and the one whose paint shows there; footprints: sizes of what light and paint are means over, m.
+void view_add_lit(vec4 lit_painted, vec2 footprints, vec3 sun, float share, INOUT(view_lit) lit)
 {
 	vec3 received = vec3(sky_irradiance_ground);
 	vec3 beam = sun;
@@ -91,15 +91,15 @@ void view_add_lit(vec4 lit_painted, float footprint, vec3 sun, float share, INOU
 		// The beam passed the layer where the parallax says; its shadow is as soft as the sun is wide.
 		vec2 through = place + vec2(sun_direction) * cloud_layer.x / max(sun_direction.z, 0.02);
 		float penumbra = 2.0 * sun_direction.w * cloud_layer.x;
-		beam *= slab_directional_transmittance(view_shadow_thickness(through, max(footprint, penumbra)));
+		beam *= slab_directional_transmittance(view_shadow_thickness(through, max(footprints.x, penumbra)));
 	}
 #endif
 	lit.beam += share * beam;
 	lit.received += share * received;
 #if VIEW_GROUND == 3
-	lit.reflectance += share * ground_ice(ground_reflectance(vec2(lit_painted.z, lit_painted.w), footprint), footprint);
+	lit.reflectance += share * ground_ice(ground_reflectance_seen(vec2(lit_painted.z, lit_painted.w), footprints.y), footprints.y);
 #elif VIEW_GROUND != 2
-	lit.reflectance += share * ground_reflectance(vec2(lit_painted.z, lit_painted.w), footprint);
+	lit.reflectance += share * ground_reflectance_seen(vec2(lit_painted.z, lit_painted.w), footprints.y);
 #endif
 }
 
@@ -109,11 +109,26 @@ float view_ground_footprint(float across, float mu_v)
 	return across * pow(mu_v, -0.75);
 }
 
-#if VIEW_REGION == 0
-// At the horizon a pixel's strip reaches over kilometres: several places of it, evenly over the picture.
-const int VIEW_STRIP_PLACES = 4;
-const float VIEW_STRIP_ROWS = 1.9; // below the horizon; rows from 2 on have a program of their own (renderer/stages/view.c)
+// Land is not flat: under a smaller angle than it undulates by, what is seen is crests from far and near, not one field in front of the next one.
+const float VIEW_UNDULATION = 0.02;
+
+// Of light, which comes to so many places that stand for the pixel, and of paint.
+vec2 view_ground_footprints(float across, float mu_v, float places)
+{
+	float footprint = view_ground_footprint(across, mu_v);
+	float steepness = VIEW_UNDULATION / mu_v;
+	return vec2(footprint * inversesqrt(places), footprint * (1.0 + steepness * steepness));
+}
+
+// At the horizon a pixel's strip reaches over kilometres: several places of it, evenly over the picture. A sea mirrors the sun so brightly that edges of shadows show where it is
+// still hundreds of metres long.
+const int VIEW_STRIP_PLACES = 8;
+#if VIEW_GROUND == 2 && VIEW_CLOUDS
+const int VIEW_STRIP_PLACES_NEAR = 3;
+#else
+const int VIEW_STRIP_PLACES_NEAR = 1;
 #endif
+const float VIEW_STRIP_ROWS = 3.9; // below the horizon; rows from 4 on have a program of their own (renderer/stages/view.c)
 
 // Radiance of the ground under sun, sky and clouds, before the air between. direction: of the middle of what the pixel shows of the ground, which is so high as a difference of
 // sines of elevation.
@@ -128,18 +143,22 @@ vec3 view_ground(vec3 direction, float high, ground_point point)
 #endif
 	view_lit lit;
 	lit.beam = lit.received = lit.reflectance = vec3(0.0);
+	int places = VIEW_STRIP_PLACES_NEAR;
 #if VIEW_REGION == 0
-	int places = direction.z > sphere_horizon(camera_position.z) - VIEW_STRIP_ROWS * camera_position.w ? VIEW_STRIP_PLACES : 1;
+	if (direction.z > sphere_horizon(camera_position.z) - VIEW_STRIP_ROWS * camera_position.w)
+		places = VIEW_STRIP_PLACES;
+#endif
+#if VIEW_REGION == 0 || (VIEW_GROUND == 2 && VIEW_CLOUDS)
 	for (int i = 0; i < places; i++) {
 		float z = direction.z + high * ((float(i) + 0.5) / float(places) - 0.5);
 		float t = places > 1 ? max(sphere_distance_down(camera_position.z, z, 0.0), 0.0) : 0.0;
 		float mu_v = places > 1 ? max(-sphere_cosine(camera_position.z, z, t, 0.0), 0.002) : point.mu_v;
 		vec2 there = places > 1 ? vec2(camera_position) + vec2(direction) * t : place;
 		float across = places > 1 ? camera_position.w * t : point.across;
-		view_add_lit(vec4(there, there + ragged), view_ground_footprint(across, mu_v), sun, 1.0 / float(places), lit);
+		view_add_lit(vec4(there, there + ragged), view_ground_footprints(across, mu_v, float(places)), sun, 1.0 / float(places), lit);
 	}
 #else
-	view_add_lit(vec4(place, place + ragged), view_ground_footprint(point.across, point.mu_v), sun, 1.0, lit);
+	view_add_lit(vec4(place, place + ragged), view_ground_footprints(point.across, point.mu_v, 1.0), sun, 1.0, lit);
 #endif
 #if VIEW_GROUND == 2
 	vec2 heading = -point.offset * inversesqrt(max(dot(point.offset, point.offset), 1e-8));
@@ -149,7 +168,10 @@ vec3 view_ground(vec3 direction, float high, ground_point point)
 	sea_slopes slopes = sea_slopes_at(point.offset, heading, point.across, point.across / point.mu_v);
 	return ground_patch.y * sea_radiance(slopes, to_viewer, to_sun, lit.beam, lit.received);
 #else
-	vec2 detail = ground_detail(point);
+	vec3 detail = ground_detail(point);
+#if VIEW_GROUND == 1
+	lit.reflectance = ground_drier(lit.reflectance, detail.z);
+#endif
 	return lit.reflectance * (lit.received + lit.beam * (max(mu_sun, 0.0) * detail.x)) * (detail.y / PI);
 #endif
 }

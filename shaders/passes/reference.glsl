@@ -275,7 +275,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float footprint = path.first ? camera_position.w * t * pow(mu_v, -0.75) : 20.0;
 	bool again = !path.first;
 	path.grounded = path.first ? 2 : max(path.grounded, 1);
-	vec2 detail = vec2(1.0);
+	vec3 detail = vec3(1.0, 1.0, 0.0);
 	vec2 there = vec2(path.place) + vec2(camera_position);
 	ground_point point;
 	point.offset = vec2(path.place);
@@ -283,16 +283,19 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	point.mu_v = mu_v;
 	point.mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
 #if VIEW_GROUND == 2
-	vec3 reflectance = ground_reflectance(there, footprint);
+	vec3 reflectance = ground_reflectance_seen(there, footprint);
 #else
 	// What the camera itself sees has all that the slab's view shows of it.
 	if (path.first)
 		detail = ground_detail(point);
 #if VIEW_GROUND == 3
-	vec3 reflectance = ground_ice(ground_reflectance(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
+	vec3 reflectance = ground_ice(ground_reflectance_seen(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
 #else
-	vec3 reflectance = ground_reflectance(there, footprint);
+	vec3 reflectance = ground_reflectance_seen(there, footprint);
 #endif
+#endif
+#if VIEW_GROUND == 1
+	reflectance = ground_drier(reflectance, detail.z);
 #endif
 	reference_first(path, sums, 1, vec3(0.0));
 #if VIEW_GROUND == 2

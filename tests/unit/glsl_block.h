@@ -13,6 +13,7 @@
 	X(ground_albedo)                                                                                                                   \
 	X(ground_patch)                                                                                                                    \
 	X(ground_mean_albedo)                                                                                                              \
+	X(ground_region)                                                                                                                   \
 	X(camera_position)                                                                                                                 \
 	X(camera_right)                                                                                                                    \
 	X(camera_up)                                                                                                                       \

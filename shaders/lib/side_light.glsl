@@ -15,11 +15,13 @@ uniform sampler2D thickness_packed;
 
 // Texels a side of the table: those of the thickness.
 const float SIDE_SIZE = HEIGHT_SIZE_SMOOTH;
-// Heights at which a slanted view looks for cloud, of that of the layer: each stands for what is between it and the next.
+// Heights at which a slanted view looks for cloud, of that of the layer; in between tops are straight.
 const int SIDE_SLICES = 4;
 const vec4 SIDE_HEIGHTS = vec4(0.0, 0.12, 0.34, 0.72);
-const vec4 SIDE_BOTTOMS = vec4(0.0, 0.06, 0.2, 0.5);
-const vec4 SIDE_LIFT = vec4(1.0, 2.0, 1.7, 1.44);
+// Where there is no cloud the top is as far below the base, m.
+const float SIDE_NONE = 40.0;
+// Of several places that are seen at once, deviation of their heights above which detail of none is told, m.
+const float SIDE_CLEAR = 20.0;
 // Views along the layer see it as under this slope, m a metre of height; slices would stand beside each other.
 const float SIDE_SLOPE_MAX = 4.0;
 
@@ -53,6 +55,7 @@ struct side_view {
 	float above;     // m of it that are met above what is thin at the base
 	vec2 place;      // m, where what is seen begins: a place of the base, or the foot of one of a side
 	float entry;     // m, its height over the base
+	float clear;     // 1 where that is the same for all that is seen, down to 0
 };
 
 // place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical.
@@ -64,16 +67,28 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v)
 	vec4 tops;
 	for (int i = 0; i < SIDE_SLICES; i++)
 		tops[i] = packed_linear(thickness_packed, uv + stride * SIDE_HEIGHTS[i], int(SIDE_SIZE), 0.0);
-	vec4 bottoms = cloud_layer.y * SIDE_BOTTOMS;
-	vec4 filled = clamp(tops - bottoms, vec4(0.0), vec4(bottoms.y, bottoms.z, bottoms.w, cloud_layer.y) - vec4(0.0, bottoms.y, bottoms.z, bottoms.w));
+	vec4 bottoms = cloud_layer.y * SIDE_HEIGHTS;
+	vec4 ends = vec4(bottoms.y, bottoms.z, bottoms.w, cloud_layer.y);
+	// How far inside the view is where a slice begins and ends; a top of 0 is none.
+	vec4 from = tops - bottoms;
+	from.x -= SIDE_NONE * max(1.0 - 0.1 * tops.x, 0.0);
+	vec4 to = vec4(from.y, from.z, from.w, tops.w - ends.w);
+	vec4 filled = (ends - bottoms) * (max(from, vec4(0.0)) + max(to, vec4(0.0))) / (abs(from) + abs(to) + 1e-3);
+	vec4 begins = ends - mix(filled, ends - bottoms, step(vec4(0.0), from));
 	vec4 before = vec4(0.0, filled.x, filled.x + filled.y, filled.x + filled.y + filled.z);
-	float extinction_per_m = extinction_scaled.y / mu_v;
-	vec4 seen = exp(-extinction_per_m * before) * (vec4(1.0) - exp(-extinction_per_m * filled));
+	// What a slice lets through: exp(-depth) but for its tail, since weights alone are wanted.
+	vec4 depth = filled * (extinction_scaled.y / mu_v);
+	vec4 passed = vec4(1.0) / (vec4(1.0) + depth * (vec4(1.0) + 0.5 * depth));
+	float left = passed.x * passed.y;
+	vec4 seen = (vec4(1.0) - passed) * vec4(1.0, passed.x, left, left * passed.z);
 	side_view view;
 	view.told = smoothstep(0.12, 0.24, mu_v);
 	view.thickness = before.w + filled.w;
 	view.above = view.thickness - filled.x;
-	view.entry = view.told * dot(seen, max(bottoms - before, vec4(0.0)) * SIDE_LIFT) / max(seen.x + seen.y + seen.z + seen.w, 1e-4);
+	seen *= view.told / max(seen.x + seen.y + seen.z + seen.w, 1e-4);
+	vec4 entries = max(begins - before, vec4(0.0));
+	view.entry = dot(seen, entries);
+	view.clear = 1.0 / (1.0 + (dot(seen, entries * entries) - view.entry * view.entry) * (1.0 / (SIDE_CLEAR * SIDE_CLEAR)));
 	view.place = place + ahead * view.entry;
 	return view;
 }
@@ -100,12 +115,15 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), 0.0);
 	float more = view.told * (view.thickness - base);
 	side_lit lit;
+	thickness = mix(base, thickness, view.clear);
+	inside = mix(base, inside, view.clear);
 	lit.thickness = max(thickness + more, 0.4 * view.told * view.above);
 	lit.inside = max(inside + more, 0.4 * view.told * view.above);
 	lit.sun = max(thickness + view.told * (light.w - base), 0.0);
 	float spread = slab_light.w * lit.inside;
+	float side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
 	lit.smooth_m = mix(lit.inside, light.x, spread / (1.0 + spread));
-	lit.light = mix(light.y, light.z, clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0));
+	lit.light = mix(light.y, light.z, side);
 	return lit;
 }
 #endif

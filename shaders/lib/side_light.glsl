@@ -21,7 +21,7 @@ const vec4 SIDE_HEIGHTS = vec4(0.0, 0.12, 0.34, 0.72);
 // Where there is no cloud the top is as far below the base, m.
 const float SIDE_NONE = 40.0;
 // Of several places that are seen at once, deviation of their heights above which detail of none is told, m.
-const float SIDE_CLEAR = 20.0;
+const float SIDE_CLEAR = 40.0;
 // Views along the layer see it as under this slope, m a metre of height; slices would stand beside each other.
 const float SIDE_SLOPE_MAX = 4.0;
 
@@ -71,10 +71,15 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v)
 	vec4 ends = vec4(bottoms.y, bottoms.z, bottoms.w, cloud_layer.y);
 	// How far inside the view is where a slice begins and ends; a top of 0 is none.
 	vec4 from = tops - bottoms;
-	from.x -= SIDE_NONE * max(1.0 - 0.1 * tops.x, 0.0);
+	float none = max(1.0 - 0.1 * tops.x, 0.0);
+	from.x -= SIDE_NONE * none;
 	vec4 to = vec4(from.y, from.z, from.w, tops.w - ends.w);
 	vec4 filled = (ends - bottoms) * (max(from, vec4(0.0)) + max(to, vec4(0.0))) / (abs(from) + abs(to) + 1e-3);
 	vec4 begins = ends - mix(filled, ends - bottoms, step(vec4(0.0), from));
+	// Of what is thin at the base both are seen, that and the side behind it.
+	float side = filled.x;
+	filled.x = max(side, min(tops.x, ends.x));
+	begins.x *= none * side / (filled.x + 1e-3);
 	vec4 before = vec4(0.0, filled.x, filled.x + filled.y, filled.x + filled.y + filled.z);
 	// What a slice lets through: exp(-depth) but for its tail, since weights alone are wanted.
 	vec4 depth = filled * (extinction_scaled.y / mu_v);

@@ -19,7 +19,7 @@ const float SIDE_SIZE = HEIGHT_SIZE_SMOOTH;
 const int SIDE_SLICES = 4;
 const vec4 SIDE_HEIGHTS = vec4(0.0, 0.12, 0.34, 0.72);
 // Where there is no cloud the top is as far below the base, m.
-const float SIDE_NONE = 40.0;
+const float SIDE_NONE = 12.0;
 // Of several places that are seen at once, deviation of their heights above which detail of none is told, m.
 const float SIDE_CLEAR = 40.0;
 // Views along the layer see it as under this slope, m a metre of height; slices would stand beside each other.

@@ -364,7 +364,13 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
 	float footprint = camera_footprint(t, cos_view);
+#if VIEW_SOLVED
+	// The paper's model knows a plane base alone.
 	side_view side = side_view_at(place, vec2(direction), cos_view);
+	vec2 seen = side.place;
+#else
+	vec2 seen = place;
+#endif
 	vec3 layer = vec3(0.0, 1.0, 0.0);
 #if VIEW_PROJECTION != 1
 	// A fisheye's footprint is as long as the strip.
@@ -372,12 +378,16 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 		layer = field_thickness_along(place, vec2(direction), footprint, cos_view, extinction_scaled.y);
 	else
 #endif
-		layer.x = layer.z = view_thickness(side.place, footprint);
+		layer.x = layer.z = view_thickness(seen, footprint);
+#if VIEW_SOLVED
 	side_lit lit = side_lit_at(side, footprint, layer.x, layer.z);
 	view_point p = view_point_at(direction, lit.thickness, lit.inside, lit.smooth_m, cos_view, view_sun_cosine(direction, t, base));
 	p.smooth_thickness = lit.smooth_m;
 	p.sun = lit.sun;
 	p.received = lit.light;
+#else
+	view_point p = view_point_at(direction, layer.x, layer.z, layer.z, cos_view, view_sun_cosine(direction, t, base));
+#endif
 	p.single = layer.y;
 
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));

@@ -1,4 +1,4 @@
-// Columns of the layer in the sun. x, y: light that is scattered often at the base and at the top, times z: thickness, m; w: thickness that the beam passes to the base, along the vertical, m.
+// Columns of the layer in the sun. x, y: light that is scattered often at the base and half way up to the top, times z: thickness, m; w: thickness that the beam passes to the base, along the vertical, m.
 // arguments[0].x: texels a side.
 #include "shaders/lib/side_light.glsl"
 
@@ -26,8 +26,9 @@ void pass(ivec2 pixel)
 	vec2 uv = (vec2(pixel) + 0.5) / arguments[0].x;
 	float h = texelFetch(thickness, pixel, 0).x;
 	float passed = column_passed(uv, 0.0, 0.0, cloud_layer.y);
-	float above = column_passed(uv, h, h, cloud_layer.y);
-	float behind = column_passed(uv, h, 0.0, h);
+	float side = 0.5 * h;
+	float above = column_passed(uv, side, side, cloud_layer.y);
+	float behind = column_passed(uv, side, 0.0, side);
 	float weight = h + 1e-2;
 	STORE(0, vec4(weight * side_source(passed, 0.0), weight * side_source(above, behind), weight, passed));
 }

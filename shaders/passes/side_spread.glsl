@@ -1,4 +1,4 @@
-// The light of columns spread sideways, as it is looked up: x thickness evened out, m; y, z light scattered often at the base and at the top over that of a layer so thick; w as it came.
+// The light of columns spread sideways, as it is looked up: x thickness evened out, m; y, z light scattered often at the base and at the sides over that of a layer so thick; w as it came.
 // arguments[0]: two lengths, m, weight of the first; texels a side.
 #include "shaders/lib/bicubic.glsl"
 #include "shaders/lib/side_light.glsl"

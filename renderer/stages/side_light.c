@@ -45,10 +45,10 @@ static bool compute(const struct side_light_stage *stage, const struct scene_blo
 									 .samplers = {thickness},
 									 .arguments = {{(float)side}}});
 		texture_build_mipmaps(&columns);
-		pass_run(stage->passes[PASS_SPREAD],
-			 &(struct pass_run){.targets = &light,
-					    .samplers = {&columns},
-					    .arguments = {{(float)(short_length * smoothing), (float)smoothing, (float)short_weight, (float)side}}});
+		pass_run(stage->passes[PASS_SPREAD], &(struct pass_run){.targets = &light,
+									.samplers = {&columns},
+									.arguments = {{(float)(short_length * smoothing), (float)smoothing,
+										       (float)short_weight, (float)side}}});
 	}
 	if (ok)
 		texture_build_mipmaps(light);

@@ -18,8 +18,8 @@ bool side_light_init(struct side_light_stage *stage, const struct pass_compiler 
 void side_light_finish(struct side_light_stage *stage);
 
 /* thickness: of the layer over the tile, m, with levels. Wants the block with sun, clouds and extinction uploaded. The table (x thickness
- * evened out, m; y, z light of the base and of the sides, of the slab's; w thickness on the beam's way to the base, m) belongs to the
- * cache and is valid for this frame. NULL when out of memory. */
+ * evened out, m; y, z light that is scattered often at the base and at the sides, of the flux on the top; w thickness on the beam's way to
+ * the base, m) belongs to the cache and is valid for this frame. NULL when out of memory. */
 const struct texture *side_light_get(const struct side_light_stage *stage, struct stage_context *context, const struct scene *scene,
 				     const struct texture *thickness);
 

@@ -128,7 +128,7 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	float spread = slab_light.w * lit.inside;
 	float side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
 	lit.smooth_m = mix(lit.inside, light.x, spread / (1.0 + spread));
-	lit.light = mix(light.y, light.z, side);
+	lit.light = mix(light.y, light.z, side) / side_transmitted(lit.smooth_m);
 	return lit;
 }
 #endif

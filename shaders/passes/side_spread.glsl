@@ -1,4 +1,4 @@
-// The light of columns spread sideways, as it is looked up: x thickness evened out, m; y, z light scattered often at the base and at the sides over that of a layer so thick; w as it came.
+// The light of columns spread sideways, as it is looked up: x thickness evened out, m; y, z light scattered often at the base and at the sides; w as it came.
 // arguments[0]: two lengths, m, weight of the first; texels a side.
 #include "shaders/lib/bicubic.glsl"
 #include "shaders/lib/side_light.glsl"
@@ -27,6 +27,5 @@ void pass(ivec2 pixel)
 	vec4 near = spread_over(uv, arguments[0].x);
 	float share = arguments[0].z;
 	vec4 sums = mix(far, near, share);
-	vec2 light = vec2(sums.x, sums.y) / (sums.z * side_transmitted(sums.z));
-	STORE(0, vec4(sums.z, light, texelFetch(columns, pixel, 0).w));
+	STORE(0, vec4(sums.z, vec2(sums.x, sums.y) / sums.z, texelFetch(columns, pixel, 0).w));
 }

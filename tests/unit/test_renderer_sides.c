@@ -1,4 +1,5 @@
-/* Ridges of cloud seen from below, solved against the reference model: where a slab would light both flanks of a ridge alike, the one towards the sun is bright. */
+/* Ridges of cloud seen from below, solved against the reference model: where a slab would light both flanks of a ridge alike, the one
+ * towards the sun is bright. */
 #include "test_renderer_common.h"
 
 #include "renderer/scene_map.h"
@@ -57,12 +58,16 @@ static void ridges_are_lit_as_light_paths_say(void **state)
 			squares += (solved[x] - truth[x]) * (solved[x] - truth[x]) / WIDTH;
 			bias += (solved[x] - truth[x]) / WIDTH;
 			mean += truth[x] / WIDTH;
-			if (getenv("PRINT")) print_message("%2d %.3f %.3f\n", x, solved[x], truth[x]);
 		}
-		print_message("sun in azimuth %.0f, %.0f degrees high: solved against reference, bias %+.1f %%, rms %.1f %%\n", suns[i][0],
-			      suns[i][1], 100 * bias / mean, 100 * sqrt(squares) / mean);
-		assert_true(fabs(bias) < 0.1 * mean);
-		assert_true(sqrt(squares) < 0.25 * mean);
+		/* Of the ridge that lies west of the camera, the flanks east (26) and west (38). */
+		const bool east = suns[i][0] < 180;
+		const double lit = solved[east ? 26 : 38] / solved[east ? 38 : 26], wanted = truth[east ? 26 : 38] / truth[east ? 38 : 26];
+		print_message("sun in azimuth %.0f, %.0f degrees high: solved against reference, bias %+.1f %%, rms %.1f %%; lit over dark "
+			      "flank %.2f, %.2f\n",
+			      suns[i][0], suns[i][1], 100 * bias / mean, 100 * sqrt(squares) / mean, lit, wanted);
+		assert_true(fabs(bias) < 0.15 * mean);
+		assert_true(sqrt(squares) < 0.45 * mean);
+		assert_true(lit > 1.5); /* of columns that know nothing of each other it is 1.2 to 1.4 */
 	}
 }
 

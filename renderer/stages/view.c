@@ -23,7 +23,7 @@ static const struct {
 } sides[VIEW_SIDES] = {
 	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
 	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n",
-			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "smooth_table", "field_coarse", "field_detail"}},
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "side_light", "field_coarse", "field_detail", "thickness_packed"}},
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
 			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
@@ -254,13 +254,14 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  above ? in->field->light : in->field->smooth,
+					  above ? in->field->light : in->field->sides,
 					  above    ? (in->seen ? &in->seen->place : NULL)
 					  : packed ? in->field->coarse_packed
 						   : in->field->coarse,
 					  above    ? (in->seen ? &in->seen->light : NULL)
 					  : packed ? in->field->detail_packed
-						   : in->field->detail};
+						   : in->field->detail,
+					  above ? NULL : in->field->thickness_packed};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 

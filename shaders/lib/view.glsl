@@ -7,6 +7,9 @@
 #include "shaders/lib/ground.glsl"
 #include "shaders/lib/ground_near.glsl"
 #include "shaders/lib/height_sun.glsl"
+#if VIEW_CLOUDS && !VIEW_ABOVE
+#include "shaders/lib/side_light.glsl"
+#endif
 #if VIEW_GROUND == 2
 #include "shaders/lib/sea.glsl"
 #endif
@@ -191,6 +194,7 @@ struct view_point {
 	float mu_v_facet;
 	float lit;         // share of the beam that comes there past other clouds
 	float received;    // by light that is scattered often, relative to a flat top
+	float sun;         // thickness that the beam meets, m
 	float single;      // light scattered once, relative to that of the thickness alone
 };
 
@@ -249,7 +253,7 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 	float m_v = p.mu_v;
 	float thickness = p.thickness;
 	float facing = 1.0;
-	float received = 1.0;
+	float received = base ? 1.0 : p.received;
 #if VIEW_ABOVE
 	if (!through) {
 		// A facet turned away from light is faded out instead of cut. One turned away from the view is not seen: what says so is the crest that a pixel is on.
@@ -259,6 +263,10 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 		thickness = p.way * m_v;
 		received = p.received;
 	}
+#endif
+#if !VIEW_ABOVE
+	if (through)
+		m_l = max(m_l * (thickness + 1e-3) / (p.sun + 1e-3), 1e-4);
 #endif
 	sun *= mu_l / max(mu_l, 0.01);
 #if VIEW_SOLVED
@@ -334,6 +342,7 @@ view_point view_point_at(vec3 direction, float thickness, float inside, float sm
 	p.mu_v_facet = p.mu_v;
 	p.lit = 1.0;
 	p.received = 1.0;
+	p.sun = thickness;
 	p.single = 1.0;
 	return p;
 }
@@ -390,6 +399,13 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
 	float footprint = camera_footprint(t, cos_view);
+#if VIEW_SOLVED
+	// The paper's model knows a plane base alone.
+	side_view side = side_view_at(place, vec2(direction), cos_view);
+	vec2 seen = side.place;
+#else
+	vec2 seen = place;
+#endif
 	vec3 layer = vec3(0.0, 1.0, 0.0);
 #if VIEW_PROJECTION != 1
 	// A fisheye's footprint is as long as the strip.
@@ -397,8 +413,16 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 		layer = field_thickness_along(place, vec2(direction), footprint, cos_view, extinction_scaled.y);
 	else
 #endif
-		layer.x = layer.z = view_thickness(place, footprint);
-	view_point p = view_point_at(direction, layer.x, layer.z, height_smooth(place, footprint), cos_view, view_sun_cosine(direction, t, base));
+		layer.x = layer.z = view_thickness(seen, footprint);
+#if VIEW_SOLVED
+	side_lit lit = side_lit_at(side, footprint, layer.x, layer.z);
+	view_point p = view_point_at(direction, lit.thickness, lit.inside, lit.smooth_m, cos_view, view_sun_cosine(direction, t, base));
+	p.smooth_thickness = lit.smooth_m;
+	p.sun = lit.sun;
+	p.received = lit.light;
+#else
+	view_point p = view_point_at(direction, layer.x, layer.z, layer.z, cos_view, view_sun_cosine(direction, t, base));
+#endif
 	p.single = layer.y;
 
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));

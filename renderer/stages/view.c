@@ -289,8 +289,7 @@ static void bound_row(const struct camera_view *view, int row, double *lowest, d
 	}
 }
 
-/* What the rays of a row of pixels have in common, with a margin of two pixels above the horizon and, where strips of ground are long, four
- * below (VIEW_STRIP_ROWS in shaders/lib/view.glsl). */
+/* What the rays of a row of pixels have in common, with a margin of two pixels. */
 static enum view_region region_of_row(const struct scene_block *block, const struct camera_view *view, enum view_side side, int row)
 {
 	const double pixel = camera_pixel_angle(view), ground = horizon_sine(block, 0);
@@ -302,7 +301,7 @@ static enum view_region region_of_row(const struct scene_block *block, const str
 	bound_row(view, row, &lowest, &highest);
 	if (lowest > sky + 2 * pixel + 1e-6)
 		return VIEW_SKY;
-	return highest < ground - 4 * pixel - 1e-6 ? VIEW_GROUND : VIEW_MIXED;
+	return highest < ground - 2 * pixel - 1e-6 ? VIEW_GROUND : VIEW_MIXED;
 }
 
 /* Is no pixel of a row, all above the horizon, larger than half a texel of the field or a texel of the thickness evened out? */

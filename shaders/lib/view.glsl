@@ -125,13 +125,13 @@ vec2 view_ground_footprints(float across, float mu_v, float places)
 
 // At the horizon a pixel's strip reaches over kilometres: several places of it, evenly over the picture. A sea mirrors the sun so brightly that edges of shadows show where it is
 // still hundreds of metres long.
-const int VIEW_STRIP_PLACES = 8;
+const int VIEW_STRIP_PLACES = 4;
 #if VIEW_GROUND == 2 && VIEW_CLOUDS
 const int VIEW_STRIP_PLACES_NEAR = 3;
 #else
 const int VIEW_STRIP_PLACES_NEAR = 1;
 #endif
-const float VIEW_STRIP_ROWS = 3.9; // below the horizon; rows from 4 on have a program of their own (renderer/stages/view.c)
+const float VIEW_STRIP_ROWS = 1.9; // below the horizon; rows from 2 on have a program of their own (renderer/stages/view.c)
 
 // Radiance of the ground under sun, sky and clouds, before the air between. direction: of the middle of what the pixel shows of the ground, which is so high as a difference of
 // sines of elevation.

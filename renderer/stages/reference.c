@@ -17,8 +17,9 @@ enum {
 	FIXED = 3,                        /* sums that every picture has: color, its part left to chance, and the square of that */
 	GROUP = PASS_OUTPUTS_MAX - FIXED, /* layers that one run adds to beside them */
 	GROUPS = (LAYER_COUNT + GROUP - 1) / GROUP,
-	SAMPLES_A_PASS = 64,
-	BLOCK_SIDE = 8 /* pixels that run in step with each other lie in such squares, of fragments and of work groups alike */
+	SAMPLES_A_PASS = 32,
+	BLOCK_SIDE = 8, /* pixels that run in step with each other lie in such squares, of fragments and of work groups alike */
+	CALL_BLOCKS = 4 /* at least, for processors to share */
 };
 
 /* Texels of the tops from below, m: as fine as pixels of the zenith are. */
@@ -99,6 +100,7 @@ static const struct pass *paths_pass(struct reference_stage *stage, const struct
 				     bool large)
 {
 	const bool layers = work->slot_count > 0;
+	struct pass_compiler compiler = stage->compiler;
 	struct pass **pass = &stage->paths[work->side][layers][projection][large][work->ground];
 	char defines[200];
 	const struct pass_desc desc = {.file = "shaders/passes/reference.glsl",
@@ -108,12 +110,15 @@ static const struct pass *paths_pass(struct reference_stage *stage, const struct
 						    "ground_map", "phase_table", "path_tops", "path_bounds", "phase_inverse",
 						    "forward_chains", "sky_at_layer", "sky_at_ground"},
 				       .adds = true};
+	/* Software shares fragments among processors by squares of 64, work groups one by one. */
+	if (compiler.software)
+		compiler.kind = PASS_COMPUTE;
 	snprintf(defines, sizeof defines,
 		 "#define REFERENCE_ABOVE %d\n#define REFERENCE_LAYERS %d\n#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n"
 		 "#define VIEW_GROUND %d\n",
 		 work->side == VIEW_ABOVE, layers, projection, large, work->ground);
 	if (!*pass)
-		*pass = pass_create(&stage->compiler, &desc);
+		*pass = pass_create(&compiler, &desc);
 	return *pass;
 }
 
@@ -298,7 +303,7 @@ static int next_rectangle(const struct camera_view *view, const struct reference
 {
 	const int columns = (width + BLOCK_SIDE - 1) / BLOCK_SIDE, rows = (view->height + BLOCK_SIDE - 1) / BLOCK_SIDE;
 	const int column = work->block % columns, row = work->block / columns;
-	const int wanted = (int)fmin(fmax(work->blocks, 1), columns * rows);
+	const int wanted = (int)fmin(fmax(work->blocks, CALL_BLOCKS), columns * rows);
 	const bool whole = column == 0 && wanted >= columns;
 	const int across = whole ? columns : (int)fmin(wanted, columns - column);
 	const int down = whole ? (int)fmin(wanted / columns, rows - row) : 1;

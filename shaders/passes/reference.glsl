@@ -181,8 +181,8 @@ void reference_scatter(INOUT(light_path) path)
 	vec3 sun = vec3(sun_direction);
 	float mu_sun = clamp(dot(path_up(path.place), sun), -1.0, 1.0);
 	float over = max(path.top + cloud_layer.x - path_height(path.place), 0.0);
-	float passes = exp(-min(extinction_modified.y * over / max(mu_sun, 0.1), 4.0));
-	float worth = passes * min(phase_full(scattering_half_angle(path.direction, sun)).y, 15.0);
+	float passes = exp(-min(extinction_modified.y * over / max(mu_sun, 0.1), 2.5));
+	float worth = passes * (min(phase_full(scattering_half_angle(path.direction, sun)).y, 15.0) + 0.2);
 	path.pick_sum += worth;
 	if (path_random(path) * path.pick_sum < worth) {
 		path.pick_place = path.place;

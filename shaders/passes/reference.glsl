@@ -222,12 +222,12 @@ void reference_look(INOUT(light_path) path)
 }
 
 // The first one.
-void reference_meet_cloud(INOUT(light_path) path, INOUT(reference_sums) sums)
+void reference_meet_cloud(INOUT(light_path) path, INOUT(reference_sums) sums, vec3 disc)
 {
 #if REFERENCE_ABOVE
 	reference_keep(sums, KIND_OPTICAL_THICKNESS, vec3(extinction.y * path.top));
 #endif
-	reference_first(path, sums, 0, vec3(0.0));
+	reference_first(path, sums, 0, disc);
 }
 
 #if VIEW_GROUND == 2
@@ -470,7 +470,7 @@ void pass(ivec2 pixel)
 			reference_look(path);
 		}
 		if (path.mode == PATH_SCATTERS && path.first)
-			reference_meet_cloud(path, sums);
+			reference_meet_cloud(path, sums, disc);
 		if (path.mode == PATH_LEAVES && path.pick_sum == 0.0)
 			reference_leave(path, sums, disc);
 		if (path.mode == PATH_DONE) {

@@ -123,8 +123,9 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	side_lit lit;
 	thickness = mix(base, thickness, view.clear);
 	inside = mix(base, inside, view.clear);
-	lit.thickness = max(thickness + more, 0.4 * view.told * view.above);
-	lit.inside = max(inside + more, 0.4 * view.told * view.above);
+	// A slanted way through the layer is all cloud at most.
+	lit.thickness = min(max(thickness + more, 0.4 * view.told * view.above), cloud_layer.y);
+	lit.inside = min(max(inside + more, 0.4 * view.told * view.above), cloud_layer.y);
 	lit.sun = max(thickness + view.told * (light.w - base), 0.0);
 	float spread = slab_light.w * lit.inside;
 	float side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);

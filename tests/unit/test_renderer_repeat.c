@@ -84,7 +84,7 @@ static void thicknesses(struct scene scene, const double centre[2], double step,
 {
 	const double dx = centre[0] - scene.camera.position_m[0], dy = centre[1] - scene.camera.position_m[1];
 	scene.camera.azimuth_deg = fmod(atan2(dx, dy) / DEGREE + 360, 360);
-	scene.camera.elevation_deg = atan2(scene.clouds.base_m, hypot(dx, dy)) / DEGREE;
+	scene.camera.elevation_deg = atan2(scene.clouds.base_m - scene.camera.position_m[2], hypot(dx, dy)) / DEGREE;
 	struct frame frame = render(&scene);
 	for (int i = 0; i < SIDE * SIDE; i++) {
 		const double place[2] = {centre[0] + step * (i % SIDE - 0.5 * SIDE), centre[1] + step * (i / SIDE - 0.5 * SIDE)};
@@ -110,11 +110,12 @@ static double correlation(const double *a, const double *b, int count)
 }
 
 /* Cameras kilometres apart, one of them in another copy of the tile, see the same clouds over the same place far from both; and the one's
- * clouds drift with the wind. */
+ * clouds drift with the wind. As the paper shades it: of plane bases, since from elsewhere one sees other sides of clouds. */
 static void clouds_far_away_stay_where_they_are(void **state)
 {
 	(void)state;
 	struct scene scene = small_scene(128, 128, LAYER(OPTICAL_THICKNESS));
+	scene.model.shading = SHADING_PAPER;
 	scene.clouds.base_m = 5000;
 	scene.clouds.tile_m = 3000;
 	scene.clouds.wind_mps[0] = 20;
@@ -137,11 +138,31 @@ static void clouds_far_away_stay_where_they_are(void **state)
 	assert_true(correlation(one, other, SIDE * SIDE) > 0.9);
 }
 
+/* Sides too: cameras on one line of sight to a place see the same ones. */
+static void sides_far_away_stay_where_they_are(void **state)
+{
+	(void)state;
+	struct scene scene = small_scene(128, 128, LAYER(OPTICAL_THICKNESS));
+	scene.clouds.base_m = 5000;
+	scene.clouds.tile_m = 3000;
+	scene.camera.vertical_fov_deg = 30;
+	const double centre[2] = {6000, 7500};
+	double one[SIDE * SIDE], other[SIDE * SIDE];
+	thicknesses(scene, centre, 40, one);
+	for (int i = 0; i < 2; i++)
+		scene.camera.position_m[i] += 0.2 * centre[i];
+	scene.camera.position_m[2] = 0.2 * scene.clouds.base_m;
+	thicknesses(scene, centre, 40, other);
+	print_message("on one line of sight: correlation %.3f\n", correlation(one, other, SIDE * SIDE));
+	assert_true(correlation(one, other, SIDE * SIDE) > 0.95);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(rows_far_away_do_not_repeat),
 		cmocka_unit_test(clouds_far_away_stay_where_they_are),
+		cmocka_unit_test(sides_far_away_stay_where_they_are),
 	};
 	return RUN_WITH_RENDERER(tests);
 }

@@ -455,7 +455,7 @@ static bool run_view(struct job *job)
 	if (!texture_init(&job->developed, output->width, output->height, output->bits == 16 ? TEXTURE_RGBA16 : TEXTURE_RGBA8,
 			  TEXTURE_NEAREST))
 		return false;
-	view_develop(&renderer->view, job->pictures[0], &job->developed);
+	view_develop(&renderer->view, job->pictures[0], job->scene->camera.projection == PROJECTION_FISHEYE, &job->developed);
 	return true;
 }
 

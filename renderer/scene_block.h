@@ -17,19 +17,22 @@ struct scene_block {
 	float ground_albedo[4];    /* of lambert ground, else the scale alone; type of ground (enum ground_type) */
 	float ground_patch[4];     /* side of the ground's picture in texels; of what is smaller: contrast, deviation of slopes, length over
 				      width; of a sea second its scale */
-	float ground_mean_albedo[4]; /* over the tile; tile of ground and cloud, m */
-	float camera_position[4];    /* x, y modulo the tile, z: metres above ground; angle between pixel centres, rad */
-	float camera_right[4];       /* unit; tangent of half the horizontal field of view */
-	float camera_up[4];          /* unit; tangent of half the vertical field of view */
-	float camera_forward[4];     /* unit; first row of the view in the picture */
-	float image_size[4];         /* width and height of the view; 1/width, 1/height */
-	float sun_disc_box[4];       /* box of weights: column, row, width, height; or of a large disc: 1/(share above the horizon) */
-	float cloud_layer[4];        /* base, m; thickness (maximum of H), m; tile, m; 1 when there are clouds */
-	float cloud_field[4];        /* share of the range where edges are thin; shift of detail, m a density; its tiles; billows, m */
-	float cloud_drift[4];        /* drift so far, m, modulo the tile: east, north; -; - */
-	float cloud_puffs[4]; /* on tops seen from above: how far they bulge from crease to top, m; their tile, m; texels a side of the
-			       * height field; -
-			       */
+	float ground_mean_albedo[4]; /* over the tile; side of the ground's picture, m, of which a whole number make the tile */
+	float ground_region[4]; /* place of the camera's tile, in pictures: east, north; 1 where the ground that is seen is put together out
+				   of regions; - */
+	float camera_position[4]; /* x, y modulo the tile, z: metres above ground; angle between pixel centres, rad */
+	float camera_right[4];    /* unit; tangent of half the horizontal field of view */
+	float camera_up[4];       /* unit; tangent of half the vertical field of view */
+	float camera_forward[4];  /* unit; first row of the view in the picture */
+	float image_size[4];      /* width and height of the view; 1/width, 1/height */
+	float sun_disc_box[4];    /* box of weights: column, row, width, height; or of a large disc: 1/(share above the horizon) */
+	float cloud_layer[4];     /* base, m; thickness (maximum of H), m; tile, m; 1 when there are clouds */
+	float cloud_field[4];     /* share of the range where edges are thin; shift of detail, m a density; its tiles; billows, m */
+	float cloud_drift[4];     /* drift so far, m, modulo the tile: east, north; -; - */
+	float cloud_warp[4];      /* phases of its waves at the camera, turns; 1 where there is one (shaders/lib/field_warp.glsl) */
+	float cloud_puffs[4];     /* on tops seen from above: how far they bulge from crease to top, m; their tile, m; texels a side of the
+				   * height field; -
+				   */
 	float cloud_puffs_drift[4]; /* where in their volume the tile's corner is: east, north, up, volumes; - */
 	float cloud_detail[4];      /* tile of the detail, m; its drift, m: east, north; weight */
 	float cloud_threshold[4]; /* field value where H begins; 1/(range above it); roundness of H, 0: a map of H; resolution of the field

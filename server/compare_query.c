@@ -245,6 +245,9 @@ static void read_variants(const json_t *root, struct compare_query *query, struc
 		return;
 	}
 	query->variant_count = (int)count;
+	/* Variants have one, which read_scene takes away. */
+	if (json_object_get(json_object_get(root, "scene"), "name"))
+		problem_add(problem, "/scene/name", "is not a member of a scene");
 	for (int i = 0; i < query->variant_count; i++)
 		read_variant(root, i, query, problem);
 	name_variants(variants, query, problem);

@@ -38,9 +38,9 @@ static void append_fragment_wrapper(struct source *source, int outputs)
 
 static void append_compute_wrapper(struct source *source, int outputs, bool adds)
 {
-	static const char at[] = "ivec2(gl_GlobalInvocationID.xy) + ivec2(0, pass_size.z)";
+	static const char at[] = "ivec2(gl_GlobalInvocationID.xy) + pass_size.zw";
 	source_print(source, "layout(local_size_x = %d, local_size_y = %d) in;\n", GROUP_SIDE, GROUP_SIDE);
-	source_print(source, "uniform ivec4 pass_size; // columns, rows, first row\n");
+	source_print(source, "uniform ivec4 pass_size; // columns, rows, first column, first row\n");
 	if (adds)
 		source_print(source, "#define STORE(i, value) imageStore(output_##i, %s, imageLoad(output_##i, %s) + (value))\n", at, at);
 	else
@@ -49,7 +49,7 @@ static void append_compute_wrapper(struct source *source, int outputs, bool adds
 		source_print(source, "layout(binding = %d%s uniform image2D output_%d;\n", i, adds ? ", rgba32f)" : ") writeonly", i);
 	source_print(source, "void pass(ivec2 pixel);\nvoid main() {\n"
 			     "\tivec2 pixel = ivec2(gl_GlobalInvocationID.xy);\n"
-			     "\tif (all(lessThan(pixel, pass_size.xy))) pass(pixel + ivec2(0, pass_size.z));\n}\n");
+			     "\tif (all(lessThan(pixel, pass_size.xy))) pass(pixel + pass_size.zw);\n}\n");
 }
 
 static bool assemble(struct source *source, const struct pass_compiler *compiler, const struct pass_desc *desc, GLenum type)
@@ -199,7 +199,7 @@ static void run_compute(const struct pass *pass, const struct pass_run *run, int
 				   pass->adds ? GL_READ_WRITE : GL_WRITE_ONLY,
 				   texture_internal_format(target ? target->format : TEXTURE_RGBA32F));
 	}
-	glProgramUniform4i(pass->program, pass->size, width, height, run->first_row, 0);
+	glProgramUniform4i(pass->program, pass->size, width, height, run->first_column, run->first_row);
 	glDispatchCompute((GLuint)(width + GROUP_SIDE - 1) / GROUP_SIDE, (GLuint)(height + GROUP_SIDE - 1) / GROUP_SIDE, 1);
 	glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
@@ -217,9 +217,9 @@ static void run_fragment(const struct pass *pass, const struct pass_run *run, in
 	}
 	glNamedFramebufferDrawBuffers(pass->framebuffer, pass->outputs, buffers);
 	glBindFramebuffer(GL_DRAW_FRAMEBUFFER, pass->framebuffer);
-	glViewport(0, 0, width, run->first_row + height);
+	glViewport(0, 0, run->first_column + width, run->first_row + height);
 	glEnable(GL_SCISSOR_TEST);
-	glScissor(0, run->first_row, width, height);
+	glScissor(run->first_column, run->first_row, width, height);
 	glBindVertexArray(pass->vertex_array);
 	if (pass->adds) {
 		glEnable(GL_BLEND);

@@ -40,7 +40,7 @@ struct pass_run {
 	struct texture *const *targets; /* as many as the pass has outputs, all of one size; NULL after the first: not kept */
 	int level;                      /* of the targets, 0 the largest */
 	int width, height;              /* pixels to run; 0: the size of the targets at that level */
-	int first_row;                  /* where the rows begin */
+	int first_column, first_row;    /* where the pixels begin */
 	const struct texture *samplers[PASS_SAMPLERS_MAX];
 	float arguments[PASS_ARGUMENTS][4];
 };

@@ -21,8 +21,8 @@ static void draw_into_gamut(float rgb[3])
 
 static float filmic(float x)
 {
-	const float y = 1 + (1.25f / 1.5f) * powf(x, 1.15f);
-	return 1 - 1 / (y * sqrtf(y));
+	const float z = 1 / sqrtf(1 + (1.25f / 1.5f) * powf(x, 1.15f)), rest = (1 - z) * (1 - z);
+	return 1 - z * (z * z + 0.5f * rest * rest);
 }
 
 static void expose_film(float rgb[3])
@@ -30,9 +30,12 @@ static void expose_film(float rgb[3])
 	static const float balance[3] = {0.93f, 1.015f, 1.10f};
 	for (int c = 0; c < 3; c++)
 		rgb[c] *= balance[c];
-	const float luminance = luminance_of(rgb), grey = luminance * luminance / (luminance * luminance + 100);
-	for (int c = 0; c < 3; c++)
-		rgb[c] = filmic(rgb[c] + grey * (luminance - rgb[c]));
+	const float red = rgb[0], square = red * red, fog = 0.002f;
+	const float share = square * (0.85f + 0.0033f * red) / ((square + 9) * (1 + 0.005f * red));
+	for (int c = 0; c < 3; c++) {
+		const float lack = fmaxf(1 - rgb[c] / fmaxf(red, 1e-9f), 0);
+		rgb[c] = filmic(rgb[c] + fog * red) * (1 - share * lack * (0.3f + 0.7f * lack * lack));
+	}
 }
 
 /* IEC 61966-2-1. */

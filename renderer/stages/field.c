@@ -51,7 +51,7 @@ static void texture_destroy(void *value)
 bool field_stage_init(struct field_stage *stage, const struct pass_compiler *compiler)
 {
 	if (!stage_create_passes(compiler, pass_descs, stage->passes, FIELD_PASS_COUNT) || !field_noise_init(&stage->noise, compiler) ||
-	    !height_light_init(&stage->light, compiler))
+	    !height_light_init(&stage->light, compiler) || !side_light_init(&stage->sides, compiler))
 		return false;
 	stage->pack = packed_pass_create(compiler);
 	if (!stage->pack) {
@@ -71,6 +71,7 @@ void field_stage_finish(struct field_stage *stage)
 	pass_destroy(stage->pack);
 	stage->pack = NULL;
 	height_light_finish(&stage->light);
+	side_light_finish(&stage->sides);
 	field_noise_finish(&stage->noise);
 	stage_destroy_passes(stage->passes, FIELD_PASS_COUNT);
 }
@@ -383,8 +384,10 @@ static bool thickness_get(const struct field_stage *stage, struct stage_context 
 		return false;
 	maps->thickness = &thickness->thickness;
 	maps->smooth = &thickness->smooth;
-	if (!from_above)
-		return true;
+	if (!from_above) {
+		maps->sides = side_light_get(&stage->sides, context, scene, maps->thickness);
+		return maps->sides;
+	}
 	maps->height = height_field_get(stage, context, scene, coarse);
 	maps->light = maps->height ? height_light_get(&stage->light, context, scene, maps->height) : NULL;
 	maps->puffs = maps->light ? height_puffs_get(context) : NULL;
@@ -397,16 +400,15 @@ static bool packed_maps_get(const struct field_stage *stage, struct stage_contex
 {
 	enum { PACKED_SIDE_MAX = 1024 };
 	struct cache_key coarse = cache_key_make("coarse packed"), detail = cache_key_make("detail packed");
-	struct cache_key smooth = thickness_key("smooth packed", clouds);
+	const struct cache_key thickness = thickness_key("thickness packed", clouds);
 	add_field_inputs(&coarse, clouds);
 	add_field_inputs(&detail, clouds);
-	cache_key_add(&smooth, context->block.slab_light[2]);
-	maps->smooth_packed = packed_get(stage->pack, context, &smooth, maps->smooth, TEXTURE_RGBA32F);
+	maps->thickness_packed = packed_get(stage->pack, context, &thickness, maps->thickness, TEXTURE_RGBA32F);
 	if (clouds->resolution > PACKED_SIDE_MAX)
-		return maps->smooth_packed;
+		return maps->thickness_packed;
 	maps->coarse_packed = packed_get(stage->pack, context, &coarse, maps->coarse, TEXTURE_RGBA32F);
 	maps->detail_packed = packed_get(stage->pack, context, &detail, maps->detail, TEXTURE_RGBA16F);
-	return maps->smooth_packed && maps->coarse_packed && maps->detail_packed;
+	return maps->thickness_packed && maps->coarse_packed && maps->detail_packed;
 }
 
 bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, bool from_above,

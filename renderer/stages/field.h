@@ -9,6 +9,7 @@
 
 #include "renderer/stages/field_noise.h"
 #include "renderer/stages/height_light.h"
+#include "renderer/stages/side_light.h"
 #include "renderer/stages/height_puffs.h"
 #include "renderer/stages/packed.h"
 
@@ -18,6 +19,7 @@ struct field_stage {
 	struct pass *passes[FIELD_PASS_COUNT];
 	struct field_noise noise;
 	struct height_light_stage light;
+	struct side_light_stage sides;
 	struct pass *pack;
 	unsigned histogram; /* OpenGL buffer */
 };
@@ -30,7 +32,9 @@ struct field_maps {
 	const struct texture *height, *light;
 	const struct height_puffs *puffs;
 	/* Packed, for views from below; coarse and detail NULL at resolutions where that would be too much memory. */
-	const struct texture *coarse_packed, *detail_packed, *smooth_packed;
+	const struct texture *coarse_packed, *detail_packed, *thickness_packed;
+	/* For views from below: how the sun lights base and sides (renderer/stages/side_light.h). */
+	const struct texture *sides;
 };
 
 bool field_stage_init(struct field_stage *stage, const struct pass_compiler *compiler);

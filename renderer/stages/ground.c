@@ -4,6 +4,7 @@
 #include "renderer/scene_map.h"
 #include "renderer/stages/sea.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -91,8 +92,30 @@ static struct ground *ground_compute(struct ground_stage *stage, const struct sc
 	return ground;
 }
 
+/* Side of the picture, m: as near to this as the tile has whole shares of that size. Larger ones would have texels larger than what stands
+ * in fields. Maps are as large as the tile. */
+static const double picture_side_m = 22000;
+
+static double picture_side_of(const struct scene *scene)
+{
+	const double tile = scene->clouds.tile_m;
+	return scene->ground.map.map ? tile : tile / fmax(1, round(tile / picture_side_m));
+}
+
+/* Regions as shaders/lib/ground.glsl has them: home in pictures, its middle and how far from it no border comes. */
+static const double home_middle = 0.25, home_sure = 0.55;
+
+bool ground_has_regions(const struct scene *scene)
+{
+	const double side = picture_side_of(scene), *position = scene->camera.position_m, h = position[2],
+		     reach = sqrt(h * (2 * 6371000.0 + h));
+	const double away = fmax(fabs(position[0] - home_middle * side), fabs(position[1] - home_middle * side));
+	return types[scene->ground.type].picture && !scene->ground.map.map && away + reach > home_sure * side;
+}
+
 static void fill_block(struct scene_block *block, const struct scene *scene, int side)
 {
+	const double picture = picture_side_of(scene), tile = scene->clouds.tile_m;
 	double sea[3];
 	sea_albedo(scene, sea);
 	for (int band = 0; band < 3; band++) {
@@ -102,7 +125,10 @@ static void fill_block(struct scene_block *block, const struct scene *scene, int
 		block->ground_albedo[band] = (float)(scene->ground.albedo_scale * albedo);
 	}
 	block->ground_albedo[3] = (float)scene->ground.type;
-	block->ground_mean_albedo[3] = (float)scene->clouds.tile_m;
+	block->ground_mean_albedo[3] = (float)picture;
+	for (int axis = 0; axis < 2; axis++)
+		block->ground_region[axis] = (float)round(floor(scene->camera.position_m[axis] / tile) * tile / picture);
+	block->ground_region[2] = ground_has_regions(scene);
 	block->ground_patch[0] = (float)side;
 	block->ground_patch[1] =
 		(float)(scene->ground.type == GROUND_SEA ? scene->ground.albedo_scale : types[scene->ground.type].contrast);
@@ -127,7 +153,7 @@ bool ground_stage_run(struct ground_stage *stage, struct stage_context *context,
 	const int side = side_of(&scene->ground);
 	fill_block(&context->block, scene, side);
 	const float *albedo = context->block.ground_albedo;
-	const double inputs[] = {scene->ground.type, albedo[0], albedo[1], albedo[2], scene->ground.albedo_scale, scene->clouds.tile_m};
+	const double inputs[] = {scene->ground.type, albedo[0], albedo[1], albedo[2], scene->ground.albedo_scale, picture_side_of(scene)};
 	struct cache_key key = cache_key_make("ground");
 	for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++)
 		cache_key_add(&key, inputs[i]);

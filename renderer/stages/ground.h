@@ -16,6 +16,9 @@ struct ground_maps {
 	double mean[3];            /* of the map */
 };
 
+/* Does the camera see ground beyond home (shaders/lib/ground.glsl)? Of what is uniform, and of maps, nothing is rearranged there. */
+bool ground_has_regions(const struct scene *scene);
+
 void ground_stage_init(struct ground_stage *stage, const struct pass_compiler *compiler);
 void ground_stage_finish(struct ground_stage *stage);
 

@@ -17,7 +17,9 @@ enum {
 	FIXED = 3,                        /* sums that every picture has: color, its part left to chance, and the square of that */
 	GROUP = PASS_OUTPUTS_MAX - FIXED, /* layers that one run adds to beside them */
 	GROUPS = (LAYER_COUNT + GROUP - 1) / GROUP,
-	SAMPLES_A_PASS = 16
+	SAMPLES_A_PASS = 32,
+	BLOCK_SIDE = 8, /* pixels that run in step with each other lie in such squares, of fragments and of work groups alike */
+	CALL_BLOCKS = 4 /* at least, for processors to share */
 };
 
 /* Texels of the tops from below, m: as fine as pixels of the zenith are. */
@@ -34,10 +36,10 @@ struct reference_work {
 	struct path_chains *drawn;
 	enum view_side side;
 	enum view_ground ground;
-	double rows; /* of a call */
+	double blocks; /* of a call */
 
 	int samples;      /* rounds that are done */
-	int view, row;    /* of the round in work: views that are done, rows of the next one */
+	int view, block;  /* of the round in work: views that are done, blocks of the next one, row by row of them */
 	int chains_first; /* the round that chains were drawn for; -1: none */
 	double spent_ms;
 };
@@ -98,6 +100,7 @@ static const struct pass *paths_pass(struct reference_stage *stage, const struct
 				     bool large)
 {
 	const bool layers = work->slot_count > 0;
+	struct pass_compiler compiler = stage->compiler;
 	struct pass **pass = &stage->paths[work->side][layers][projection][large][work->ground];
 	char defines[200];
 	const struct pass_desc desc = {.file = "shaders/passes/reference.glsl",
@@ -107,12 +110,15 @@ static const struct pass *paths_pass(struct reference_stage *stage, const struct
 						    "ground_map", "phase_table", "path_tops", "path_bounds", "phase_inverse",
 						    "forward_chains", "sky_at_layer", "sky_at_ground"},
 				       .adds = true};
+	/* Software shares fragments among processors by squares of 64, work groups one by one. */
+	if (compiler.software)
+		compiler.kind = PASS_COMPUTE;
 	snprintf(defines, sizeof defines,
 		 "#define REFERENCE_ABOVE %d\n#define REFERENCE_LAYERS %d\n#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n"
 		 "#define VIEW_GROUND %d\n",
 		 work->side == VIEW_ABOVE, layers, projection, large, work->ground);
 	if (!*pass)
-		*pass = pass_create(&stage->compiler, &desc);
+		*pass = pass_create(&compiler, &desc);
 	return *pass;
 }
 
@@ -249,7 +255,7 @@ static bool asks(renderer_cancelled *question, void *context)
 /* The first rounds are short, so that there soon is a picture. */
 static int round_samples(int first, int samples)
 {
-	const int wanted = first < 1 ? 1 : first < 4 ? 3 : first < SAMPLES_A_PASS ? SAMPLES_A_PASS - 4 : SAMPLES_A_PASS;
+	const int wanted = first < 1 ? 1 : first < 4 ? 3 : first < 16 ? 12 : first < SAMPLES_A_PASS ? 16 : SAMPLES_A_PASS;
 	return wanted < samples - first ? wanted : samples - first;
 }
 
@@ -257,8 +263,7 @@ static struct pass_run run_of(const struct scene *scene, const struct reference_
 			      const struct round *round)
 {
 	const struct view_inputs *view = inputs->view;
-	return (struct pass_run){.width = scene->output.width,
-				 .samplers = {view->sky->transmittance, view->sky->total, view->sky->near, view->sky->to_layer,
+	return (struct pass_run){.samplers = {view->sky->transmittance, view->sky->total, view->sky->near, view->sky->to_layer,
 					      view->sky->to_end, view->ground->map, &view->droplets->phase, &work->tables.tops,
 					      &work->tables.bounds, &work->tables.inverse, &work->tables.chains, inputs->sky_at_layer,
 					      inputs->sky_at_ground},
@@ -268,9 +273,9 @@ static struct pass_run run_of(const struct scene *scene, const struct reference_
 					       {0, (float)scene->model.paths}}};
 }
 
-/* Some rows, of all groups. false when a program does not compile. */
-static bool run_rows(struct reference_stage *stage, const struct camera_view *view, bool large, struct reference_work *work,
-		     struct pass_run *run)
+/* A rectangle, of all groups of layers. false when a program does not compile. */
+static bool run_rectangle(struct reference_stage *stage, const struct camera_view *view, bool large, struct reference_work *work,
+			  struct pass_run *run)
 {
 	for (int group = 0; group < work->group_count; group++) {
 		const struct pass *pass = paths_pass(stage, work, view->projection, large);
@@ -293,28 +298,44 @@ static bool run_rows(struct reference_stage *stage, const struct camera_view *vi
 
 enum outcome { OUTCOME_DONE, OUTCOME_PAUSED, OUTCOME_STOPPED, OUTCOME_TIME_OVER, OUTCOME_FAILED };
 
-/* The rows of one view, a few at a time, from where an earlier call left off. */
-static enum outcome run_view_rows(struct reference_stage *stage, const struct camera_view *view, bool large, const struct round *round,
-				  struct reference_work *work, struct pass_run *run)
+/* The next blocks of a view: some of a row of blocks, or some whole rows. Returns how many they are. */
+static int next_rectangle(const struct camera_view *view, const struct reference_work *work, int width, struct pass_run *run)
 {
-	while (work->row < view->height) {
+	const int columns = (width + BLOCK_SIDE - 1) / BLOCK_SIDE, rows = (view->height + BLOCK_SIDE - 1) / BLOCK_SIDE;
+	const int column = work->block % columns, row = work->block / columns;
+	const int wanted = (int)fmin(fmax(work->blocks, CALL_BLOCKS), columns * rows);
+	const bool whole = column == 0 && wanted >= columns;
+	const int across = whole ? columns : (int)fmin(wanted, columns - column);
+	const int down = whole ? (int)fmin(wanted / columns, rows - row) : 1;
+	run->first_column = column * BLOCK_SIDE;
+	run->width = (int)fmin(across * BLOCK_SIDE, width - run->first_column);
+	run->first_row = view->first_row + row * BLOCK_SIDE;
+	run->height = (int)fmin(down * BLOCK_SIDE, view->height - row * BLOCK_SIDE);
+	return across * down;
+}
+
+/* The blocks of one view, a few at a time, from where an earlier call left off. */
+static enum outcome run_view_blocks(struct reference_stage *stage, const struct camera_view *view, int width, bool large,
+				    const struct round *round, struct reference_work *work, struct pass_run *run)
+{
+	const int count = ((width + BLOCK_SIDE - 1) / BLOCK_SIDE) * ((view->height + BLOCK_SIDE - 1) / BLOCK_SIDE);
+	while (work->block < count) {
 		const double begin = clock_milliseconds();
 		if (asks(round->watch->cancelled, round->watch->context))
 			return OUTCOME_STOPPED;
 		if (round->deadline > 0 && begin > round->deadline && round->first > 0)
 			return OUTCOME_TIME_OVER;
-		run->first_row = view->first_row + work->row;
-		run->height = (int)fmin(fmax(work->rows, 1), view->height - work->row);
-		if (!run_rows(stage, view, large, work, run))
+		const int blocks = next_rectangle(view, work, width, run);
+		if (!run_rectangle(stage, view, large, work, run))
 			return OUTCOME_FAILED;
-		work->row += run->height;
-		/* What a call takes now, the next one will take per sample and row. */
+		work->block += blocks;
+		/* What a call takes now, the next one will take per sample and block. */
 		const double took = clock_milliseconds() - begin;
-		work->rows = run->height * fmin(fmax(call_ms / fmax(took, 0.01), 0.25), 4);
+		work->blocks = blocks * fmin(fmax(call_ms / fmax(took, 0.01), 0.25), 4);
 		if (asks(round->watch->paused, round->watch->context))
 			return OUTCOME_PAUSED;
 	}
-	work->row = 0;
+	work->block = 0;
 	return OUTCOME_DONE;
 }
 
@@ -341,12 +362,12 @@ static enum outcome run_round(struct reference_stage *stage, struct stage_contex
 	for (; work->view < camera_view_count(scene); work->view++) {
 		const struct camera_view view = camera_view_of(scene, work->view);
 		set_view(stage, context, scene, work->view);
-		outcome = run_view_rows(stage, &view, stage->disc.views[work->view].large, round, work, &run);
+		outcome = run_view_blocks(stage, &view, scene->output.width, stage->disc.views[work->view].large, round, work, &run);
 		if (outcome != OUTCOME_DONE)
 			return outcome;
 	}
 	work->view = 0;
-	work->rows *= (double)round->samples / fmax(1, round_samples(round->first + round->samples, scene->model.samples));
+	work->blocks *= (double)round->samples / fmax(1, round_samples(round->first + round->samples, scene->model.samples));
 	return outcome;
 }
 
@@ -407,7 +428,7 @@ static struct reference_work *begin_work(struct reference_stage *stage, const st
 		return NULL;
 	work->side = scene->camera.position_m[2] < scene->clouds.base_m ? VIEW_BELOW : VIEW_ABOVE;
 	work->ground = view_ground_of(scene);
-	work->rows = 1;
+	work->blocks = 1;
 	work->chains_first = -1;
 	if (make_tops(stage, scene, inputs->view, work) && make_droplets(inputs->view, work) && make_sums(scene, layers, count, work))
 		return work;

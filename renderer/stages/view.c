@@ -2,6 +2,7 @@
 
 #include "renderer/log.h"
 #include "renderer/stages/colour.h"
+#include "renderer/stages/ground.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -22,13 +23,20 @@ static const struct {
 } sides[VIEW_SIDES] = {
 	[VIEW_CLEAR] = {"#define VIEW_CLOUDS 0\n#define VIEW_ABOVE 0\n", {COMMON_SAMPLERS}},
 	[VIEW_BELOW] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 0\n",
-			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "smooth_table", "field_coarse", "field_detail"}},
+			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "side_light", "field_coarse", "field_detail", "thickness_packed"}},
 	[VIEW_ABOVE] = {"#define VIEW_CLOUDS 1\n#define VIEW_ABOVE 1\n",
 			{COMMON_SAMPLERS, CLOUD_SAMPLERS, "height_light", "seen_place", "seen_light"}},
 };
-static const struct pass_desc develop_descs[2] = {
-	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 0\n", .outputs = 1, .samplers = {"picture"}},
-	{.file = "shaders/passes/develop.glsl", .defines = "#define DEVELOP_NEAR 1\n", .outputs = 1, .samplers = {"picture"}},
+/* By codes of 8 bits, and twice that by a round picture. */
+#define DEVELOP(defines_text)                                                                                                              \
+	{                                                                                                                                  \
+		.file = "shaders/passes/develop.glsl", .defines = defines_text, .outputs = 1, .samplers = { "picture" }                    \
+	}
+static const struct pass_desc develop_descs[VIEW_DEVELOPS] = {
+	DEVELOP("#define DEVELOP_NEAR 0\n#define DEVELOP_ROUND 0\n"),
+	DEVELOP("#define DEVELOP_NEAR 1\n#define DEVELOP_ROUND 0\n"),
+	DEVELOP("#define DEVELOP_NEAR 0\n#define DEVELOP_ROUND 1\n"),
+	DEVELOP("#define DEVELOP_NEAR 1\n#define DEVELOP_ROUND 1\n"),
 };
 
 /* Of what lies close by (shaders/lib/ground.glsl). */
@@ -40,16 +48,30 @@ enum view_ground view_ground_of(const struct scene *scene)
 	return grounds[scene->ground.type];
 }
 
+/* Metres a pixel in which nothing is seen any more of what shaders/lib/ground_near.glsl leaves out then: tufts, and the finest of the
+ * ragged edges of ice. Pixels are smallest below the camera. */
+static const double near_end_m[VIEW_GROUNDS] = {[VIEW_GROWN] = 0.6, [VIEW_ICE] = 6};
+
+static enum view_reach reach_of_scene(const struct scene *scene)
+{
+	const struct camera_view view = camera_view_of(scene, 0);
+	if (!ground_has_regions(scene))
+		return VIEW_NEAR;
+	const double pixel = camera_pixel_angle(&view) * scene->camera.position_m[2];
+	return pixel < near_end_m[view_ground_of(scene)] ? VIEW_NEAR_AND_FAR : VIEW_FAR;
+}
+
 struct pass *view_create_pass(const struct pass_compiler *compiler, const char *file, int outputs, const struct view_variant *variant)
 {
-	char defines[320];
+	char defines[384];
 	struct pass_desc desc = {.file = file, .defines = defines, .outputs = outputs};
 	snprintf(defines, sizeof defines,
 		 "%s%s#define VIEW_REGION %d\n#define VIEW_SOLVED %d\n#define VIEW_TWILIGHT %d\n#define VIEW_COLOR_ONLY %d\n"
-		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n",
+		 "#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n#define VIEW_GROUND %d\n"
+		 "#define VIEW_GROUND_REGIONS %d\n#define VIEW_GROUND_CLOSE %d\n",
 		 sides[variant->side].defines, variant->packed ? "#define FIELD_PACKED 1\n" : "", variant->region,
 		 variant->shading == SHADING_SOLVED, variant->twilight, !variant->layers, variant->projection, variant->large_sun,
-		 variant->ground);
+		 variant->ground, variant->reach != VIEW_NEAR, variant->reach != VIEW_FAR);
 	memcpy(desc.samplers, sides[variant->side].samplers, sizeof desc.samplers);
 	if (variant->ground == VIEW_SEA)
 		desc.samplers[GROUND_SAMPLER] = "sea_sky";
@@ -60,7 +82,7 @@ struct pass *view_create_pass(const struct pass_compiler *compiler, const char *
 static struct pass *pass_of(struct view_stage *stage, const struct view_variant *variant)
 {
 	struct pass **pass = &stage->passes[variant->shading][variant->side][variant->twilight][variant->layers][variant->region]
-					   [variant->projection][variant->large_sun][variant->packed][variant->ground];
+					   [variant->projection][variant->large_sun][variant->packed][variant->ground][variant->reach];
 	if (!*pass)
 		*pass = view_create_pass(&stage->compiler, "shaders/passes/view.glsl", variant->layers ? VIEW_OUTPUTS : 1, variant);
 	return *pass;
@@ -70,7 +92,7 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 {
 	stage->compiler = *compiler;
 	view_samples_init(&stage->samples, compiler);
-	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, 2) && view_up_init(&stage->up, compiler) &&
+	bool ok = stage_create_passes(compiler, develop_descs, stage->develop, VIEW_DEVELOPS) && view_up_init(&stage->up, compiler) &&
 		  height_view_init(&stage->height, compiler);
 	for (int side = 0; ok && side < VIEW_SIDES; side++)
 		for (int region = 0; ok && region < VIEW_REGIONS; region++)
@@ -87,11 +109,11 @@ bool view_stage_init(struct view_stage *stage, const struct pass_compiler *compi
 
 void view_stage_finish(struct view_stage *stage)
 {
-	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0][0];
+	struct pass **passes = &stage->passes[0][0][0][0][0][0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->passes / sizeof *passes; i++)
 		pass_destroy(passes[i]);
 	view_up_finish(&stage->up);
-	stage_destroy_passes(stage->develop, 2);
+	stage_destroy_passes(stage->develop, VIEW_DEVELOPS);
 	texture_finish(&stage->spare);
 	disc_buffer_finish(&stage->disc);
 	height_view_finish(&stage->height);
@@ -107,12 +129,29 @@ static void set4(float *to, double x, double y, double z, double w)
 	to[3] = (float)w;
 }
 
+/* Phases at the camera of the waves that shift the tile's copies against each other; they move with the clouds. An uploaded map is a tile
+ * that somebody wants to see as it is. */
+static void fill_warp(struct scene_block *block, const struct scene *scene)
+{
+	static const double waves[3][2] = {{0.4158, 0.1271}, {0.0726, 0.3143}, {-0.1701, 0.1586}}; /* shaders/lib/field_warp.glsl */
+	const struct scene_clouds *clouds = &scene->clouds;
+	for (int i = 0; i < 3; i++) {
+		double turns = fmod((i + 1) * 0.6180339887 * clouds->seed, 1);
+		for (int axis = 0; axis < 2; axis++)
+			turns += waves[i][axis] * (scene->camera.position_m[axis] - clouds->wind_mps[axis] * clouds->time_s) /
+				 clouds->tile_m;
+		block->cloud_warp[i] = (float)(turns - floor(turns));
+	}
+	block->cloud_warp[3] = clouds->map.map ? 0 : 1;
+}
+
 void view_fill_camera(struct scene_block *block, const struct scene *scene, const struct camera_view *view)
 {
 	const double(*axes)[3] = view->axes;
 	const double tile = scene->clouds.tile_m;
 	const double x = scene->camera.position_m[0], y = scene->camera.position_m[1], z = scene->camera.position_m[2];
 	set4(block->camera_position, x - tile * floor(x / tile), y - tile * floor(y / tile), z, camera_pixel_angle(view));
+	fill_warp(block, scene);
 	set4(block->camera_right, axes[0][0], axes[0][1], axes[0][2], view->tangent[0]);
 	set4(block->camera_up, axes[1][0], axes[1][1], axes[1][2], view->tangent[1]);
 	set4(block->camera_forward, axes[2][0], axes[2][1], axes[2][2], view->first_row);
@@ -215,13 +254,14 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  above ? in->field->light : in->field->smooth,
+					  above ? in->field->light : in->field->sides,
 					  above    ? (in->seen ? &in->seen->place : NULL)
 					  : packed ? in->field->coarse_packed
 						   : in->field->coarse,
 					  above    ? (in->seen ? &in->seen->light : NULL)
 					  : packed ? in->field->detail_packed
-						   : in->field->detail};
+						   : in->field->detail,
+					  above ? NULL : in->field->thickness_packed};
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
@@ -252,16 +292,16 @@ static void bound_row(const struct camera_view *view, int row, double *lowest, d
 /* What the rays of a row of pixels have in common, with a margin of two pixels. */
 static enum view_region region_of_row(const struct scene_block *block, const struct camera_view *view, enum view_side side, int row)
 {
-	const double margin = 2 * camera_pixel_angle(view) + 1e-6, ground = horizon_sine(block, 0);
+	const double pixel = camera_pixel_angle(view), ground = horizon_sine(block, 0);
 	/* From above, rays that miss the ground may still graze the layer. */
 	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
 	double lowest, highest;
 	if (view->projection == PROJECTION_FISHEYE)
 		return sky < -1e-6 ? VIEW_SKY : VIEW_MIXED; /* it ends at elevation 0 */
 	bound_row(view, row, &lowest, &highest);
-	if (lowest > sky + margin)
+	if (lowest > sky + 2 * pixel + 1e-6)
 		return VIEW_SKY;
-	return highest < ground - margin ? VIEW_GROUND : VIEW_MIXED;
+	return highest < ground - 2 * pixel - 1e-6 ? VIEW_GROUND : VIEW_MIXED;
 }
 
 /* Is no pixel of a row, all above the horizon, larger than half a texel of the field or a texel of the thickness evened out? */
@@ -275,6 +315,10 @@ static bool row_is_near(const struct scene_block *block, const struct camera_vie
 	const double mu_v = ((radius + h) * lowest + distance) / (radius + base);
 	/* As camera_footprint in shaders/lib/camera.glsl. */
 	const double slant = view->projection == PROJECTION_FISHEYE ? mu_v : sqrt(mu_v);
+	/* And none so far away that the tile is warped: FIELD_WARP_BEGIN in shaders/lib/field_warp.glsl. */
+	const double across = distance * sqrt(fmax(0, 1 - lowest * lowest));
+	if (block->cloud_warp[3] > 0 && across > 0.5 * block->cloud_layer[2])
+		return false;
 	return mu_v > 0.01 && block->camera_position[3] * distance / slant < block->cloud_layer[2] / texels;
 }
 
@@ -453,13 +497,15 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 	const enum view_side side = side_of(scene, inputs);
 	const enum view_ground ground = view_ground_of(scene);
 	if (side == VIEW_CLEAR)
-		return (struct view_variant){.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground};
+		return (struct view_variant){
+			.side = side, .shading = SHADING_SOLVED, .layers = layers, .ground = ground, .reach = reach_of_scene(scene)};
 	return (struct view_variant){.side = side,
 				     .shading = scene->model.shading,
 				     .twilight = context->block.slab_light[1] > 0,
 				     .layers = layers,
 				     .packed = side == VIEW_BELOW && inputs->field->coarse_packed,
-				     .ground = ground};
+				     .ground = ground,
+				     .reach = reach_of_scene(scene)};
 }
 
 /* The picture with so many rays a side of a pixel. */
@@ -591,7 +637,8 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	return ok;
 }
 
-void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target)
+void view_develop(const struct view_stage *stage, const struct texture *picture, bool round_picture, struct texture *target)
 {
-	pass_run(stage->develop[target->format == TEXTURE_RGBA8], &(struct pass_run){.targets = &target, .samplers = {picture}});
+	pass_run(stage->develop[(target->format == TEXTURE_RGBA8) + 2 * round_picture],
+		 &(struct pass_run){.targets = &target, .samplers = {picture}});
 }

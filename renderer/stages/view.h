@@ -22,6 +22,11 @@ enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 /* What the ground is close by. The numbers stand in shaders/lib/ground.glsl. */
 enum view_ground { VIEW_BARE, VIEW_GROWN, VIEW_SEA, VIEW_ICE, VIEW_GROUNDS };
 
+enum { VIEW_DEVELOPS = 4 };
+
+/* How much of the ground is seen: what lies close by, the regions that the far ground is made of (shaders/lib/ground.glsl), or both. */
+enum view_reach { VIEW_NEAR, VIEW_NEAR_AND_FAR, VIEW_FAR, VIEW_REACHES };
+
 /* The view pass exists in many forms, since software renderers execute both sides of every branch. */
 struct view_variant {
 	enum view_side side;
@@ -32,21 +37,22 @@ struct view_variant {
 	enum projection projection; /* of a camera_view */
 	bool large_sun;             /* sun_disc.large */
 	enum view_ground ground;
+	enum view_reach reach;
 	bool packed; /* the field, from below */
 };
 
 struct view_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
-	/* By shading, side, twilight, layers, region, projection, large sun, packed, ground. Those that most pictures need are made at the
-	 * start, the others with the first picture that wants them. */
-	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][2][VIEW_GROUNDS];
+	/* By shading, side, twilight, layers, region, projection, large sun, packed, ground, reach. Those that most pictures need are made
+	 * at the start, the others with the first picture that wants them. */
+	struct pass *passes[SHADING_COUNT][VIEW_SIDES][2][2][VIEW_REGIONS][PROJECTION_COUNT][2][2][VIEW_GROUNDS][VIEW_REACHES];
 	struct view_up_stage up;
 	struct height_view_stage height;
 	struct view_samples_stage samples;
-	struct pass *develop[2];       /* into codes of 16 and of 8 bits */
-	struct texture spare;          /* of a picture that was dropped, to be used again; may be none */
-	struct disc_buffer disc;       /* of the last picture made */
-	renderer_cancelled *cancelled; /* of the picture being made; may be NULL */
+	struct pass *develop[VIEW_DEVELOPS]; /* into codes of 16 and of 8 bits, of a picture with corners and of a round one */
+	struct texture spare;                /* of a picture that was dropped, to be used again; may be none */
+	struct disc_buffer disc;             /* of the last picture made */
+	renderer_cancelled *cancelled;       /* of the picture being made; may be NULL */
 	void *cancel_context;
 };
 
@@ -87,7 +93,8 @@ struct view_variant view_variant_of(const struct stage_context *context, const s
 				    bool layers);
 void view_bind_inputs(struct pass_run *run, enum view_side side, const struct view_inputs *inputs);
 
-/* Exposure, tone and sRGB of a picture into `target` (RGBA8 or RGBA16). Reads the block's develop member. */
-void view_develop(const struct view_stage *stage, const struct texture *picture, struct texture *target);
+/* Exposure, tone and sRGB of a picture into `target` (RGBA8 or RGBA16). Of a round one, a fisheye, the edge of the circle is softened over
+ * a pixel, which the picture itself is not, since its pixels are radiances. Reads the block's develop member. */
+void view_develop(const struct view_stage *stage, const struct texture *picture, bool round_picture, struct texture *target);
 
 #endif

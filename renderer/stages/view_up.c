@@ -31,12 +31,12 @@ const struct pass *view_up_pass(struct view_up_stage *stage, enum projection pro
 	snprintf(defines, sizeof defines, "%s%s%s#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n", DEFINES,
 		 packed ? "#define FIELD_PACKED 1\n" : "", reaches[reach], projection, large_sun);
 	if (!*pass)
-		*pass = pass_create(&stage->compiler,
-				    &(struct pass_desc){.file = "shaders/passes/view_up.glsl",
-							.defines = defines,
-							.outputs = 1,
-							.samplers = {"field_coarse", "field_detail", "smooth_packed", "cloud_received",
-								     "up_sky", "up_air", "up_sun", "up_first", "up_light"}});
+		*pass = pass_create(&stage->compiler, &(struct pass_desc){.file = "shaders/passes/view_up.glsl",
+									  .defines = defines,
+									  .outputs = 1,
+									  .samplers = {"field_coarse", "field_detail", "thickness_packed",
+										       "side_light", "cloud_received", "up_sky", "up_air",
+										       "up_sun", "up_first", "up_light"}});
 	return *pass;
 }
 
@@ -125,7 +125,8 @@ bool view_up_prepare(struct view_up_stage *stage, struct stage_context *context,
 	const struct texture *samplers[] = {
 		field->coarse_packed ? field->coarse_packed : field->coarse,
 		field->detail_packed ? field->detail_packed : field->detail,
-		field->smooth_packed,
+		field->thickness_packed,
+		field->sides,
 		&stage->received,
 		air[0],
 		air[1],

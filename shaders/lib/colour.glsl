@@ -13,19 +13,29 @@ vec3 colour_of_bands(vec3 bands)
 // sky, so that sunlit cloud keeps a trace of the sun's warmth and a grey sky a trace of blue. Pictures in files of scene light (EXR), and the linear tone, stay colorimetric.
 const vec3 COLOUR_FILM_BALANCE = vec3(0.93, 1.015, 1.10);
 
-// Light far beyond white loses its colour on film, whose layers are all saturated: towards grey of the same luminance, half way at ten times white.
-vec3 colour_bleach(vec3 rgb)
-{
-	float luminance = dot(rgb, vec3(0.2126, 0.7152, 0.0722));
-	return mix(rgb, vec3(luminance), luminance * luminance / (luminance * luminance + 100.0));
-}
-
-// The filmic curve, a channel at a time: 1 - (1 + a x^c / n)^-n. The exponent c makes shadows and middle greys a little steeper than linear, as film is; n sets how long the
-// shoulder is: the larger, the sooner white. Middle grey 0.18 comes out at 0.15, twice white (2.0) at 0.79, and white itself only at infinity.
+// The filmic curve, a channel at a time: 1 - z^3 - w z (1 - z)^4 with z = (1 + a x^c)^(-1/2). The exponent c makes shadows and middle greys a little steeper than linear, as film is.
+// Middle grey 0.18 comes out at 0.15, twice white (2.0) at 0.78. From there the second term bears a long shoulder, of a slope that hardly matters below: 0.91 at five
+// times white, 0.96 at forty, 0.99 at a thousand, and white itself only at infinity, so that the sun's disc stands out of its aureole and a silver lining has grades.
 float colour_filmic(float x)
 {
-	float y = 1.0 + (1.25 / 1.5) * pow(x, 1.15);
-	return 1.0 - 1.0 / (y * sqrt(y));
+	float z = inversesqrt(1.0 + (1.25 / 1.5) * pow(x, 1.15));
+	float rest = (1.0 - z) * (1.0 - z);
+	return 1.0 - z * (z * z + 0.5 * rest * rest);
+}
+
+// By the curve alone all channels of light far beyond white end alike, white whatever its hue, the disc of a setting sun too. Warm light goes to a tint of its own hue instead: a
+// channel loses by what it lacks to the red one, the more from middle greys to ten times white, where the light round a low sun is, and a little less
+// beyond, so that the disc is paler than its aureole. Not even that light is of one colour alone (COLOUR_FILM_FOG). Cool light, as in a corona, goes to white.
+const float COLOUR_FILM_FOG = 0.002;
+
+vec3 colour_filmic_hue(vec3 rgb)
+{
+	float square = rgb.x * rgb.x;
+	float share = square * (0.85 + 0.0033 * rgb.x) / ((square + 9.0) * (1.0 + 0.005 * rgb.x));
+	vec2 lack = max(vec2(1.0) - vec2(rgb.y, rgb.z) * (1.0 / max(rgb.x, 1e-9)), vec2(0.0));
+	vec2 kept = vec2(1.0) - share * lack * (vec2(0.3) + 0.7 * lack * lack);
+	rgb += COLOUR_FILM_FOG * rgb.x;
+	return vec3(colour_filmic(rgb.x), kept * vec2(colour_filmic(rgb.y), colour_filmic(rgb.z)));
 }
 
 // Rec.709 colours outside the gamut are drawn to grey until no channel is negative, which keeps their luminance.

@@ -2,6 +2,7 @@
 #ifndef SHADERS_LIB_FIELD
 #define SHADERS_LIB_FIELD
 #include "shaders/lib/bicubic.glsl"
+#include "shaders/lib/field_warp.glsl"
 #include "shaders/lib/packed.glsl"
 #include "shaders/lib/scene_block.glsl"
 
@@ -80,10 +81,10 @@ float field_detail_sum(vec2 p, float density, float octaves)
 	return sum;
 }
 
-// The field alone, where pixels are larger than texels.
-float field_far_at(vec2 place, float octaves)
+// The field alone, where pixels are larger than texels. p: place in the drifting field.
+float field_far_at(vec2 p, float octaves)
 {
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	vec2 uv = p / cloud_layer.z;
 #ifdef FIELD_PACKED
 	return packed_linear_between(field_coarse, uv, int(cloud_threshold.w), octaves);
 #else
@@ -94,7 +95,7 @@ float field_far_at(vec2 place, float octaves)
 // The field before its threshold. place: metres east and north of the tile's corner; octaves: field_octaves.
 float field_density_at(vec2 place, float octaves)
 {
-	vec2 p = place - vec2(cloud_drift.x, cloud_drift.y);
+	vec2 p = field_place(place);
 	float density = field_coarse_at(p / cloud_layer.z, octaves);
 	return density + cloud_detail.w * field_detail_sum(p, density, octaves);
 }
@@ -134,7 +135,7 @@ float field_thickness_of(float density, float footprint)
 float field_thickness_shadow(vec2 place, float footprint)
 {
 	float lod = max(0.6, log2(footprint * cloud_threshold.w / cloud_layer.z));
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	vec2 uv = field_place(place) / cloud_layer.z;
 #ifdef FIELD_PACKED
 	float density = packed_linear_between(field_coarse, uv, int(cloud_threshold.w), lod);
 #else
@@ -159,10 +160,11 @@ vec3 field_thickness_along(vec2 place, vec2 heading, float footprint, float mu_v
 	vec2 part = heading * inversesqrt(max(dot(heading, heading), 1e-12)) * (strip / float(FIELD_ALONG_PARTS));
 	float octaves = field_octaves(max(footprint, strip / float(FIELD_ALONG_PARTS)));
 	float softness = field_softness(octaves);
-	float detail = cloud_detail.w * field_detail_sum(place - vec2(cloud_drift.x, cloud_drift.y), field_far_at(place, octaves), octaves);
+	vec2 p = field_place(place);
+	float detail = cloud_detail.w * field_detail_sum(p, field_far_at(p, octaves), octaves);
 	vec4 thickness;
 	for (int i = 0; i < FIELD_ALONG_PARTS; i++) {
-		vec2 at = place + part * (float(i) - 0.5 * float(FIELD_ALONG_PARTS - 1));
+		vec2 at = p + part * (float(i) - 0.5 * float(FIELD_ALONG_PARTS - 1));
 		thickness[i] = field_thickness_soft(field_far_at(at, octaves) + detail, softness);
 	}
 	vec4 depth = thickness * (extinction_per_m / mu_v);

@@ -1,4 +1,4 @@
-// Reflectance of the ground per band (650, 550, 450 nm), painted once as a periodic picture over the tile. GROUND_TYPE: enum ground_type, fixed when the program is
+// Reflectance of the ground per band (650, 550, 450 nm), painted once as a periodic picture. GROUND_TYPE: enum ground_type, fixed when the program is
 // built, since software renderers would execute all of them.
 #ifndef SHADERS_LIB_GROUND_PAINT
 #define SHADERS_LIB_GROUND_PAINT
@@ -93,32 +93,47 @@ vec3 ground_crop(uint hash)
 	return crop * (0.88 + 0.24 * tone);
 }
 
-// Districts between roads, each cut by its own grid into rows of parcels with straight borders, some with hedges; woods, which end where a parcel does or do not; and some villages.
+// Where along the way across a picture a river runs that crosses it from south to north: 0 on the river. Its bends are some kilometres wide.
+float ground_river_side(vec2 p, float tile)
+{
+	float aside = p.x + 0.035 * noise_turbulence(p, max(1, int(tile / 7000.0 + 0.5)), 3, 59u, 0.0) - 0.62;
+	return aside - floor(aside + 0.5);
+}
+
+// Metres to the river's middle, by its slope over the ground.
+float ground_river_distance(vec2 p, float tile)
+{
+	float step_of_slope = 20.0 / tile;
+	float here = ground_river_side(p, tile);
+	vec2 slope = vec2(ground_river_side(p + vec2(step_of_slope, 0.0), tile), ground_river_side(p + vec2(0.0, step_of_slope), tile)) - here;
+	return 20.0 * abs(here) / max(length(slope), 0.2 * step_of_slope);
+}
+
+// Districts between roads, each cut by its own grid into rows of parcels with straight borders, some with hedges; woods, which end where a parcel does or do not; some villages; and a river.
 vec3 ground_country(vec2 p, float tile)
 {
 	p += vec2(0.0876, -0.0409); // the scene's origin lies on a meadow
 	float texel = 0.5 * tile / ground_patch.x; // from sample to sample
-	float larger = max(1.0, tile / 30000.0); // lest texels be larger than fields
-	int districts = max(1, int(tile / (1900.0 * larger) + 0.5));
+	int districts = max(1, int(tile / 1900.0 + 0.5));
 	float size = tile / float(districts);
 	vec2 warp = 0.05 * vec2(noise_turbulence(p, districts, 2, 41u, 0.0), noise_turbulence(p, districts, 2, 42u, 0.0));
 	ground_patch_at district = ground_patches(p * float(districts) + warp, districts, 43u);
 
 	float angle = 2.0 * PI * noise_unit(district.hash);
 	vec2 forth = vec2(cos(angle), sin(angle));
-	vec2 place = vec2(dot(district.from_middle, forth), forth.x * district.from_middle.y - forth.y * district.from_middle.x) * (size / larger);
+	vec2 place = vec2(dot(district.from_middle, forth), forth.x * district.from_middle.y - forth.y * district.from_middle.x) * size;
 	float depth = 180.0 + 260.0 * noise_unit(noise_hash(district.hash + 1u));
 	vec2 row = ground_cut(place.y / depth, district.hash);
 	uint row_hash = noise_hash2(int(row.x), 1, district.hash);
 	float width = depth * (0.35 + 0.9 * noise_unit(row_hash));
 	vec2 column = ground_cut(place.x / width, row_hash);
 	uint parcel = noise_hash2(int(row.x), int(column.x), district.hash);
-	float border = larger * min(row.y * depth, column.y * width);
+	float border = min(row.y * depth, column.y * width);
 	float road = 0.5 * district.border * size;
 
 	vec3 field = ground_crop(parcel) * (1.0 + 0.05 * noise_turbulence(p, districts * 6, 4, 49u, 0.0));
 	float hedges = 4.0 + 10.0 * noise_unit(noise_hash(district.hash + 2u));
-	field = mix(field, ALBEDO_FOREST, ground_line(hedges * larger, border, texel));
+	field = mix(field, ALBEDO_FOREST, ground_line(hedges, border, texel));
 
 	int woods = max(1, int(tile / 2100.0 + 0.5));
 	float tree = 0.75 * noise_turbulence(p, woods, 2, 44u, 0.0) + 0.10 * noise_turbulence(p, woods * 5, 2, 45u, 0.0) + 0.9 * (noise_unit(noise_hash(parcel + 7u)) - 0.5) - 0.62;
@@ -131,7 +146,13 @@ vec3 ground_country(vec2 p, float tile)
 	bool village = (district.hash & 7u) == 0u && reach < 1.0;
 	vec3 built = mix(ALBEDO_MEADOW, (house & 1u) == 0u ? ALBEDO_ROOF : ALBEDO_FOREST, 0.6);
 	field = village ? built : field;
-	return mix(field, ALBEDO_ROAD, ground_line(7.0 * larger, road, texel));
+	field = mix(field, ALBEDO_ROAD, ground_line(7.0, road, texel));
+
+	// A river between meadows, its banks grown over here and there.
+	float river = ground_river_distance(p, tile);
+	float bank = 150.0 + 90.0 * noise_turbulence(p, districts * 2, 2, 60u, 0.0);
+	field = mix(field, mix(ALBEDO_MEADOW, forest, smoothstep(0.0, 0.4, tree + 0.55)), 1.0 - smoothstep(bank, bank + 40.0, river));
+	return mix(field, ALBEDO_WATER, 1.0 - smoothstep(-0.5 * texel, 0.5 * texel, river - 38.0));
 }
 
 // Drier and moister, over the tile.

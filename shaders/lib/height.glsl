@@ -2,6 +2,7 @@
 // base, with its means and its maxima over ever larger squares.
 #ifndef SHADERS_LIB_HEIGHT
 #define SHADERS_LIB_HEIGHT
+#include "shaders/lib/field_warp.glsl"
 #include "shaders/lib/sphere.glsl"
 
 // height_table: means and maxima, as shares of the highest that a top can be.
@@ -17,14 +18,14 @@ const float HEIGHT_SIZE_SMOOTH = 256.0;
 float height_at(vec2 place, float footprint)
 {
 	float lod = max(0.0, log2(footprint * cloud_puffs.z / cloud_layer.z));
-	return textureLod(height_table, (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z, lod).x * cloud_layer.y;
+	return textureLod(height_table, field_place(place) / cloud_layer.z, lod).x * cloud_layer.y;
 }
 
 // Thickness evened out over the way that light goes sideways, m.
 float height_smooth(vec2 place, float footprint)
 {
 	float lod = max(0.0, log2(footprint * HEIGHT_SIZE_SMOOTH / cloud_layer.z));
-	return textureLod(smooth_table, (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z, lod).x;
+	return textureLod(smooth_table, field_place(place) / cloud_layer.z, lod).x;
 }
 
 // How the top rises to the east and to the north; differences over `reach`, m, to either side.

@@ -46,13 +46,19 @@ vec2 height_tap(vec2 uv, float level)
 	return vec2(textureLod(height_table, uv, level)) * cloud_layer.y;
 }
 
+// Where in the tile an offset from the camera is, all in tiles.
+vec2 height_warped(vec2 offset)
+{
+	return offset + field_warp(offset);
+}
+
 // Distance up to which no ray of a block, `radius` per distance around this one, meets any cloud; the end of the range or beyond where none
 // meets one at all. begun: what is known to be empty.
 float height_block_start(vec3 direction, vec2 range, float radius, float begun)
 {
 	float texel = cloud_layer.z / cloud_puffs.z;
 	vec2 origin = (vec2(camera_position) - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
-	vec2 rate = vec2(direction) / cloud_layer.z;
+	vec2 rate = vec2(direction) / cloud_layer.z; // of the offset from the camera
 	float speed = max(length(vec2(direction)), 1e-3);
 	// Rays of the block that point further down reach the layer earlier.
 	float t = max(range.x * max(1.0 - radius / max(-direction.z, radius), 0.0), begun);
@@ -63,11 +69,11 @@ float height_block_start(vec3 direction, vec2 range, float radius, float begun)
 			break;
 		float cell = texel * exp2(level);
 		// A value between texels holds for half a cell around: a quarter of it sideways for the block, a quarter ahead and back.
-		float hop = 0.5 * cell / speed;
+		float hop = 0.5 * cell / speed * field_warp_reach(rate * t);
 		float around = radius * (t + hop);
 		float lowest = min(height_of_ray(direction.z, t), height_of_ray(direction.z, t + hop)) - around;
 		bool wide = 0.25 * cell >= around;
-		if (wide && lowest > height_tap(origin + rate * (t + 0.5 * hop), level).y + puffs) {
+		if (wide && lowest > height_tap(origin + height_warped(rate * (t + 0.5 * hop)), level).y + puffs) {
 			t += hop;
 			level = min(level + 1.0, HEIGHT_LEVEL_MAX);
 		} else {
@@ -129,6 +135,11 @@ height_ray height_ray_of(vec3 direction, float pixel_angle)
 	return ray;
 }
 
+vec2 height_uv(height_ray ray, float t)
+{
+	return ray.origin + height_warped(ray.rate * t);
+}
+
 // Distance from t on, or from end on, at which the surface may be within a texel or a pixel.
 float height_approach(height_ray ray, float t, float end)
 {
@@ -137,9 +148,9 @@ float height_approach(height_ray ray, float t, float end)
 	for (int i = 0; i < HEIGHT_HOPS; i++) {
 		float cell = texel * exp2(level);
 		// A value between texels holds for half a cell around, so it is taken in the middle of the way that it is wanted for.
-		float hop = cell * ray.slowness;
+		float hop = cell * ray.slowness * field_warp_reach(ray.rate * t);
 		float lowest = min(height_of_ray(ray.down, t), height_of_ray(ray.down, t + hop));
-		float top = height_tap(ray.origin + ray.rate * (t + 0.5 * hop), level).y;
+		float top = height_tap(height_uv(ray, t + 0.5 * hop), level).y;
 #if HEIGHT_NEAR
 		top += HEIGHT_PUFF_TOP * height_puff_scale(top);
 #endif
@@ -188,7 +199,8 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			float width = ray.spread * t; // of what a pixel covers
 			float finest = max(width, texel);
 			float z = height_of_ray(direction.z, t);
-			vec2 tap = height_tap(ray.origin + ray.rate * t, log2(finest / texel));
+			vec2 uv = height_uv(ray, t);
+			vec2 tap = height_tap(uv, log2(finest / texel));
 			float soft = pixel_angle * t + 0.2 * (tap.y - tap.x) * clamp(width / texel - 1.0, 0.0, 1.0);
 			// Where there is no cloud, what the base's height is off by is none either.
 			float gap = z - tap.x + (3.0 + soft) * max(1.0 - tap.x, 0.0);
@@ -197,7 +209,7 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 			finest = max(width, 0.25 * texel);
 			float scale = height_puff_scale(tap.x);
 			room -= HEIGHT_PUFF_TOP * scale;
-			gap -= scale * height_bulge((ray.origin + ray.rate * t) * cloud_layer.z, z, width);
+			gap -= scale * height_bulge(uv * cloud_layer.z, z, width);
 #endif
 			float stride = gap > 0.0 ? 0.7 * finest + 0.55 * gap : max(0.7 * finest, dense * min(-0.05 * gap, 1.0)) - 0.8 * gap;
 			if (before >= 0.0) {
@@ -243,7 +255,7 @@ height_path height_march(vec3 direction, vec2 range, float pixel_angle)
 				break;
 		}
 	}
-	if (t <= range.y && path.clear > HEIGHT_OPAQUE && height_tap(ray.origin + ray.rate * t, 5.0).x > 1.0) {
+	if (t <= range.y && path.clear > HEIGHT_OPAQUE && height_tap(height_uv(ray, t), 5.0).x > 1.0) {
 		// Out of steps, which happens far away along the tops: where there are any, there is always another cloud.
 		vec2 to_which = path.weight.x > HEIGHT_HARDLY ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
 		path.weight += path.clear * to_which;

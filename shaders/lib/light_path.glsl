@@ -5,6 +5,7 @@
 // which the bands would have drawn it (Wilkie et al. 2014, "Hero Wavelength Spectral Sampling": the balance heuristic over bands).
 #ifndef SHADERS_LIB_LIGHT_PATH
 #define SHADERS_LIB_LIGHT_PATH
+#include "shaders/lib/field_warp.glsl"
 #include "shaders/lib/noise.glsl"
 #include "shaders/lib/optics.glsl"
 #include "shaders/lib/sky_table.glsl"
@@ -32,13 +33,24 @@ const int PATH_SUN = 2;    // looks for the sun from there (shaders/lib/light_pa
 const int PATH_TURNS = 3;    // is scattered forward on its way to the sun
 const int PATH_SCATTERS = 4; // is scattered
 const int PATH_LEAVES = 5;   // has left the layer's two spheres
-const int PATH_DONE = 6;
+const int PATH_ARRIVES = 6;  // has left them on its way to the sun
+const int PATH_DONE = 7;
 
 struct light_path {
 	vec3 place; // m east, north, up from the camera's foot, on the plane that touches the Earth there
 	vec3 direction;
 	vec3 kept_place; // of the path while it looks for the sun
 	vec3 kept_direction;
+	int kept_mode;
+	// The scattering that is to look for the sun: one of the last few, drawn in proportion to what it is expected to find.
+	vec3 pick_place;
+	vec3 pick_direction; // before it
+	vec3 pick_ratio;
+	float pick_worth; // what it is expected to find, and the sum of that over those it was drawn from; 0: none
+	float pick_sum;
+	float pick_passes; // share of the sun's light that was expected there
+	int pick_kind;
+	bool pick_straight;
 	vec3 ratio; // density with which each band would have drawn the path, over the hero's
 	vec3 share; // per band, what the densities do not hold: reflectances, the air before the first event
 	int hero;
@@ -57,6 +69,7 @@ struct light_path {
 	float next;    // m, where it is scattered next
 	float weight;  // of the way up to there, as path_sun_weight counts it
 	float reach;   // m, up to the end of the layer
+	float whole;   // of it as it is weighed
 	int cloudy;    // parts of that way that are expected to lie in cloud, as a bit set
 	vec2 looked;   // scales of the shares of forward scatterings that are looked for in those parts and elsewhere
 	float mean;    // number of forward scatterings that is looked for
@@ -109,7 +122,7 @@ vec3 path_up(vec3 place)
 
 vec2 path_tile(vec3 place)
 {
-	return (vec2(place) + vec2(camera_position) - vec2(cloud_drift)) / cloud_layer.z;
+	return (vec2(place) + vec2(camera_position) - vec2(cloud_drift)) / cloud_layer.z + field_warp(vec2(place) / cloud_layer.z);
 }
 
 float path_top(vec3 place)

@@ -18,9 +18,10 @@ const int PATH_CHAIN_ROWS = 64;
 // The way to the sun is looked at in so many parts, short ones first.
 const int PATH_PARTS = 16;
 const float PATH_PARTS_BEND = 12.0;
-// Where no cloud is expected there may be some: share of the forward scatterings looked for beside cloud, and away from it.
-const float PATH_BESIDE = 0.4;
-const float PATH_AWAY = 0.15;
+// Where no cloud is expected there may be some: share of the forward scatterings looked for beside cloud, and away from it. Every one of them that meets no cloud brings nothing, so that
+// few are worth looking for.
+const float PATH_BESIDE = 0.3;
+const float PATH_AWAY = 0.015;
 const float PATH_IN_VAIN = 1.5;
 const float PATH_SURE = 4.0; // optical thickness
 const float PATH_MOST = 6.0;
@@ -56,10 +57,10 @@ float path_part_share(int cloudy, vec2 looked, int part)
 }
 
 // Draws where the path is scattered next: x of a uniform density over the rest of the ways as they are weighed.
-void path_sun_draw_next(INOUT(light_path) path, float whole)
+void path_sun_draw_next(INOUT(light_path) path)
 {
 	float share = pow(path_random(path), 1.0 / float(max(path.left, 1)));
-	path.weight = mix(whole, path.weight, share);
+	path.weight = mix(path.whole, path.weight, share);
 	float rest = path.weight;
 	float at = -1.0;
 	for (int i = 0; i < PATH_PARTS; i++) {
@@ -125,10 +126,10 @@ int path_sun_look(vec3 place, float height, float mu_sun, float reach, float fur
 	return cloudy;
 }
 
-// Begins to look for the sun. place: where the straight way to the sun enters the layer; height above ground, cosine of the sun there. The number of forward
-// scatterings is drawn, and with it the direction to begin with. Returns what the way brings by itself, densities included, per band; 0: not worth
-// looking.
-vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_sun)
+// Begins to look for the sun. place: where the straight way to the sun enters the layer; height above ground, cosine of the sun there; ratio: densities of
+// the path up to there; worth: what is at stake, over what comes through. The number of forward scatterings is drawn, and with it the direction to begin with. Returns what the way
+// brings by itself, densities included, per band; 0: not worth looking.
+vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_sun, vec3 ratio, float worth)
 {
 	vec3 peak = vec3(extinction) - vec3(extinction_modified);
 	float hero_peak = path_of_hero(peak, path.hero);
@@ -140,12 +141,12 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 	// Long ways to a low sun lie in the open, or lead through so much cloud that light takes another: no more scatterings are looked for there than light makes.
 	float in_vain = path_sun_whole(path.cloudy, vec2(0.0, 1.0)) * path.reach;
 	path.looked = min(vec2(1.0), vec2(2.0 * PATH_MOST, PATH_IN_VAIN) / max(hero_peak * vec2(expected, in_vain), vec2(1e-6)));
-	float whole = path_sun_whole(path.cloudy, path.looked);
+	path.whole = path_sun_whole(path.cloudy, path.looked);
 
-	float patience = clamp(4.0 * exp(-path_of_hero(vec3(extinction_modified), path.hero) * expected * min(10.0 * abs(mu_sun), 1.0)), 0.03, 1.0);
+	float patience = clamp(worth * exp(-path_of_hero(vec3(extinction_modified), path.hero) * expected * min(10.0 * abs(mu_sun), 1.0)), 0.03, 1.0);
 	bool looks = path_random(path) < patience;
 	// Poisson's law by inversion.
-	float way = whole * path.reach;
+	float way = path.whole * path.reach;
 	path.mean = hero_peak * way;
 	float term = exp(-path.mean);
 	float sum = term;
@@ -167,10 +168,10 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 	path.direction = path_sun_direction(path, texel);
 	// More forward scatterings than a chain holds are left out: a share of 1e-5 of what gets through so much cloud at all.
 	vec3 densities = path_sun_ratio(path, texel) * exp((vec3(hero_peak) - peak) * way);
-	path_sun_draw_next(path, whole);
+	path_sun_draw_next(path);
 	// Densities are over the hero's, whose own exp(-mean) stands in path_sun_arrives.
 	vec3 own = path_sun_ratio(path, texel);
-	vec3 weight = path.share * path.ratio * own / max(dot(PATH_HERO_SHARE, path.ratio * densities), 1e-30);
+	vec3 weight = path.share * ratio * own / max(dot(PATH_HERO_SHARE, ratio * densities), 1e-30);
 	return looks && count < PATH_CHAIN_LENGTH ? weight / patience : vec3(0.0);
 }
 
@@ -201,7 +202,7 @@ void path_sun_turns(INOUT(light_path) path)
 	path.sun /= path_part_share(path.cloudy, path.looked, path_part_at(path.arc / path.reach));
 	path.left = max(path.left - 1, 0);
 	path.direction = path_sun_direction(path, path_sun_texel(path));
-	path_sun_draw_next(path, path_sun_whole(path.cloudy, path.looked));
+	path_sun_draw_next(path);
 	path.mode = PATH_SUN;
 }
 #endif

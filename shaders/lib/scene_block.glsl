@@ -5,8 +5,8 @@ const int SEA_WAVES = 128;
 #ifndef __cplusplus
 #define SCENE_MEMBERS(M) \
 	M(sun_direction) M(sun_at_camera) M(solar_irradiance) M(rayleigh) M(aerosol) M(aerosol_shape) M(ozone) M(ground_albedo) M(ground_patch) \
-	M(ground_mean_albedo) M(camera_position) M(camera_right) M(camera_up) M(camera_forward) M(image_size) M(sun_disc_box) M(cloud_layer) \
-	M(cloud_field) M(cloud_drift) M(cloud_puffs) M(cloud_puffs_drift) M(cloud_detail) M(cloud_threshold) M(extinction) M(extinction_modified) M(extinction_scaled) \
+	M(ground_mean_albedo) M(ground_region) M(camera_position) M(camera_right) M(camera_up) M(camera_forward) M(image_size) M(sun_disc_box) M(cloud_layer) \
+	M(cloud_field) M(cloud_drift) M(cloud_warp) M(cloud_puffs) M(cloud_puffs_drift) M(cloud_detail) M(cloud_threshold) M(extinction) M(extinction_modified) M(extinction_scaled) \
 	M(slab_slice_range) M(slab_light) M(sky_irradiance_cloud) M(sky_irradiance_ground) M(air_below) M(air_around) M(band_red) M(band_green) \
 	M(band_blue) M(develop) M(sea_state)
 #define SCENE_BLOCK_MEMBER(name) vec4 name;

@@ -5,7 +5,7 @@
 // Lighting using Seamless Transitions from Geometry to BRDF").
 #ifndef SHADERS_LIB_SEA
 #define SHADERS_LIB_SEA
-#include "shaders/lib/scene_block.glsl"
+#include "shaders/lib/ground_lattice.glsl"
 #include "shaders/lib/slopes.glsl"
 
 #ifndef __cplusplus
@@ -56,6 +56,19 @@ struct sea_slopes {
 
 // Waves shorter than this many pixels are roughness alone; those of twice the length are there by two thirds.
 const float SEA_WAVE_PIXELS = 2.3;
+// Where pixels are larger than this, m, only the few longest waves would be left, as corduroy: they go, too.
+const float SEA_WAVES_END = 2.5;
+
+// Gusts and slicks: how much rougher or smoother than the mean the sea is, over hundreds of metres.
+float sea_gusts(vec2 offset, float along)
+{
+	vec2 foot = vec2(camera_position.x, camera_position.y);
+	vec3 small = ground_noise(ground_lattice_at(foot, offset, vec2(310.0)), 91u);
+	vec3 large = ground_noise(ground_lattice_at(foot, offset, vec2(1700.0)), 92u);
+	float seen_small = 1.0 / (1.0 + along * along * (1.0 / (90.0 * 90.0)));
+	float seen_large = 1.0 / (1.0 + along * along * (1.0 / (500.0 * 500.0)));
+	return 1.0 + clamp(0.08 * seen_small * (small.z + 0.5 * small.x) + 0.10 * seen_large * large.z, -0.3, 0.3);
+}
 
 // offset: from the camera's foot, m; heading: horizontal unit vector to the viewer; across, along: size of the pixel on the water, m.
 sea_slopes sea_slopes_at(vec2 offset, vec2 heading, float across, float along)
@@ -63,6 +76,7 @@ sea_slopes sea_slopes_at(vec2 offset, vec2 heading, float across, float along)
 	sea_slopes s;
 	s.resolved = vec2(0.0);
 	vec3 seen = vec3(0.0);
+	float shown = 1.0 / (1.0 + across * across * (1.0 / (SEA_WAVES_END * SEA_WAVES_END)));
 	// The pixel as a quadratic form of wave numbers: 1 where a wave is no longer seen.
 	float far = SEA_WAVE_PIXELS * SEA_WAVE_PIXELS * along * along;
 	float wide = SEA_WAVE_PIXELS * SEA_WAVE_PIXELS * across * across;
@@ -75,7 +89,7 @@ sea_slopes sea_slopes_at(vec2 offset, vec2 heading, float across, float along)
 		for (int i = 0; i < 4; i++) {
 			vec4 wave = sea_waves[first + i]; // wave number, 1/m; phase, turns; slope over wave number
 			float left = max(1.0 - wave.x * (wave.x * pixel.x + wave.y * pixel.y) - wave.y * wave.y * pixel.z, 0.0);
-			vec2 slope = vec2(wave.x, wave.y) * (wave.w * left * left);
+			vec2 slope = vec2(wave.x, wave.y) * (wave.w * shown * left * left);
 			// A cosine for eyes: a cubic of the same variance.
 			float turn = wave.x * offset.x + wave.y * offset.y + wave.z;
 			float x = abs(turn - floor(turn) - 0.5) - 0.25;
@@ -83,7 +97,7 @@ sea_slopes sea_slopes_at(vec2 offset, vec2 heading, float across, float along)
 			seen += vec3(slope.x * slope.x, slope.x * slope.y, slope.y * slope.y);
 		}
 	}
-	s.total = vec3(sea_state);
+	s.total = vec3(sea_state) * sea_gusts(offset, along);
 	s.covariance = s.total - 0.5 * seen;
 	return s;
 }

@@ -1,11 +1,15 @@
 // The picture: what arrives at the camera along a ray, in parts that add up to the whole. W/m2/nm/sr in the three bands.
 #ifndef SHADERS_LIB_VIEW
 #define SHADERS_LIB_VIEW
+#define FIELD_WARPED 1
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/field.glsl"
 #include "shaders/lib/ground.glsl"
 #include "shaders/lib/ground_near.glsl"
 #include "shaders/lib/height_sun.glsl"
+#if VIEW_CLOUDS && !VIEW_ABOVE
+#include "shaders/lib/side_light.glsl"
+#endif
 #if VIEW_GROUND == 2
 #include "shaders/lib/sea.glsl"
 #endif
@@ -51,7 +55,7 @@ float view_sun_cosine(vec3 direction, float t, float height)
 float view_thickness(vec2 place, float footprint)
 {
 #if VIEW_ABOVE
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	vec2 uv = field_place(place) / cloud_layer.z;
 	return textureLod(height_light, uv, max(0.0, log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z))).z;
 #else
 	return field_thickness(place, footprint);
@@ -78,8 +82,8 @@ struct view_lit {
 	vec3 reflectance;
 };
 
-// lit_painted: the place that light comes to, and the one whose paint shows there.
-void view_add_lit(vec4 lit_painted, float footprint, vec3 sun, float share, INOUT(view_lit) lit)
+// lit_painted: the place that light comes to, and the one whose paint shows there; footprints: sizes of what light and paint are means over, m.
+void view_add_lit(vec4 lit_painted, vec2 footprints, vec3 sun, float share, INOUT(view_lit) lit)
 {
 	vec3 received = vec3(sky_irradiance_ground);
 	vec3 beam = sun;
@@ -90,15 +94,15 @@ void view_add_lit(vec4 lit_painted, float footprint, vec3 sun, float share, INOU
 		// The beam passed the layer where the parallax says; its shadow is as soft as the sun is wide.
 		vec2 through = place + vec2(sun_direction) * cloud_layer.x / max(sun_direction.z, 0.02);
 		float penumbra = 2.0 * sun_direction.w * cloud_layer.x;
-		beam *= slab_directional_transmittance(view_shadow_thickness(through, max(footprint, penumbra)));
+		beam *= slab_directional_transmittance(view_shadow_thickness(through, max(footprints.x, penumbra)));
 	}
 #endif
 	lit.beam += share * beam;
 	lit.received += share * received;
 #if VIEW_GROUND == 3
-	lit.reflectance += share * ground_ice(ground_reflectance(vec2(lit_painted.z, lit_painted.w), footprint), footprint);
+	lit.reflectance += share * ground_ice(ground_reflectance_seen(vec2(lit_painted.z, lit_painted.w), footprints.y), footprints.y);
 #elif VIEW_GROUND != 2
-	lit.reflectance += share * ground_reflectance(vec2(lit_painted.z, lit_painted.w), footprint);
+	lit.reflectance += share * ground_reflectance_seen(vec2(lit_painted.z, lit_painted.w), footprints.y);
 #endif
 }
 
@@ -108,11 +112,26 @@ float view_ground_footprint(float across, float mu_v)
 	return across * pow(mu_v, -0.75);
 }
 
-#if VIEW_REGION == 0
-// At the horizon a pixel's strip reaches over kilometres: several places of it, evenly over the picture.
+// Land is not flat: under a smaller angle than it undulates by, what is seen is crests from far and near, not one field in front of the next one.
+const float VIEW_UNDULATION = 0.02;
+
+// Of light, which comes to so many places that stand for the pixel, and of paint.
+vec2 view_ground_footprints(float across, float mu_v, float places)
+{
+	float footprint = view_ground_footprint(across, mu_v);
+	float steepness = VIEW_UNDULATION / mu_v;
+	return vec2(footprint * inversesqrt(places), footprint * (1.0 + steepness * steepness));
+}
+
+// At the horizon a pixel's strip reaches over kilometres: several places of it, evenly over the picture. A sea mirrors the sun so brightly that edges of shadows show where it is
+// still hundreds of metres long.
 const int VIEW_STRIP_PLACES = 4;
-const float VIEW_STRIP_ROWS = 1.9; // below the horizon; rows from 2 on have a program of their own (renderer/stages/view.c)
+#if VIEW_GROUND == 2 && VIEW_CLOUDS
+const int VIEW_STRIP_PLACES_NEAR = 3;
+#else
+const int VIEW_STRIP_PLACES_NEAR = 1;
 #endif
+const float VIEW_STRIP_ROWS = 1.9; // below the horizon; rows from 2 on have a program of their own (renderer/stages/view.c)
 
 // Radiance of the ground under sun, sky and clouds, before the air between. direction: of the middle of what the pixel shows of the ground, which is so high as a difference of
 // sines of elevation.
@@ -127,18 +146,22 @@ vec3 view_ground(vec3 direction, float high, ground_point point)
 #endif
 	view_lit lit;
 	lit.beam = lit.received = lit.reflectance = vec3(0.0);
+	int places = VIEW_STRIP_PLACES_NEAR;
 #if VIEW_REGION == 0
-	int places = direction.z > sphere_horizon(camera_position.z) - VIEW_STRIP_ROWS * camera_position.w ? VIEW_STRIP_PLACES : 1;
+	if (direction.z > sphere_horizon(camera_position.z) - VIEW_STRIP_ROWS * camera_position.w)
+		places = VIEW_STRIP_PLACES;
+#endif
+#if VIEW_REGION == 0 || (VIEW_GROUND == 2 && VIEW_CLOUDS)
 	for (int i = 0; i < places; i++) {
 		float z = direction.z + high * ((float(i) + 0.5) / float(places) - 0.5);
 		float t = places > 1 ? max(sphere_distance_down(camera_position.z, z, 0.0), 0.0) : 0.0;
 		float mu_v = places > 1 ? max(-sphere_cosine(camera_position.z, z, t, 0.0), 0.002) : point.mu_v;
 		vec2 there = places > 1 ? vec2(camera_position) + vec2(direction) * t : place;
 		float across = places > 1 ? camera_position.w * t : point.across;
-		view_add_lit(vec4(there, there + ragged), view_ground_footprint(across, mu_v), sun, 1.0 / float(places), lit);
+		view_add_lit(vec4(there, there + ragged), view_ground_footprints(across, mu_v, float(places)), sun, 1.0 / float(places), lit);
 	}
 #else
-	view_add_lit(vec4(place, place + ragged), view_ground_footprint(point.across, point.mu_v), sun, 1.0, lit);
+	view_add_lit(vec4(place, place + ragged), view_ground_footprints(point.across, point.mu_v, 1.0), sun, 1.0, lit);
 #endif
 #if VIEW_GROUND == 2
 	vec2 heading = -point.offset * inversesqrt(max(dot(point.offset, point.offset), 1e-8));
@@ -148,7 +171,10 @@ vec3 view_ground(vec3 direction, float high, ground_point point)
 	sea_slopes slopes = sea_slopes_at(point.offset, heading, point.across, point.across / point.mu_v);
 	return ground_patch.y * sea_radiance(slopes, to_viewer, to_sun, lit.beam, lit.received);
 #else
-	vec2 detail = ground_detail(point);
+	vec3 detail = ground_detail(point);
+#if VIEW_GROUND == 1
+	lit.reflectance = ground_drier(lit.reflectance, detail.z);
+#endif
 	return lit.reflectance * (lit.received + lit.beam * (max(mu_sun, 0.0) * detail.x)) * (detail.y / PI);
 #endif
 }
@@ -168,6 +194,7 @@ struct view_point {
 	float mu_v_facet;
 	float lit;         // share of the beam that comes there past other clouds
 	float received;    // by light that is scattered often, relative to a flat top
+	float sun;         // thickness that the beam meets, m
 	float single;      // light scattered once, relative to that of the thickness alone
 };
 
@@ -226,7 +253,7 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 	float m_v = p.mu_v;
 	float thickness = p.thickness;
 	float facing = 1.0;
-	float received = 1.0;
+	float received = base ? 1.0 : p.received;
 #if VIEW_ABOVE
 	if (!through) {
 		// A facet turned away from light is faded out instead of cut. One turned away from the view is not seen: what says so is the crest that a pixel is on.
@@ -236,6 +263,10 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 		thickness = p.way * m_v;
 		received = p.received;
 	}
+#endif
+#if !VIEW_ABOVE
+	if (through)
+		m_l = max(m_l * (thickness + 1e-3) / (p.sun + 1e-3), 1e-4);
 #endif
 	sun *= mu_l / max(mu_l, 0.01);
 #if VIEW_SOLVED
@@ -311,6 +342,7 @@ view_point view_point_at(vec3 direction, float thickness, float inside, float sm
 	p.mu_v_facet = p.mu_v;
 	p.lit = 1.0;
 	p.received = 1.0;
+	p.sun = thickness;
 	p.single = 1.0;
 	return p;
 }
@@ -346,6 +378,18 @@ void view_attenuate(vec3 air, INOUT(view_parts) parts)
 }
 
 #if VIEW_CLOUDS && !VIEW_ABOVE
+// Beside the sun the beam comes to the air below the layer past the very clouds that are seen: air before a gap is lit, air before a thick cloud lies in its shadow, not both by the
+// mean. What that makes of the share of a clear sky's light that the mean leaves. along: transmittance of the layer along the view; distance: to it. Up to an offset of
+// VIEW_BEAM_ASIDE at the layer, a part of the size of clouds, and not over long ways, on which haze mixes the beams.
+const float VIEW_BEAM_ASIDE = 400.0; // m
+const float VIEW_BEAM_MIXED = 8000.0;
+
+vec3 view_air_beside(vec3 along, vec2 half_angle, float distance)
+{
+	float aside = half_angle.x * (2.0 / VIEW_BEAM_ASIDE);
+	return (along - vec3(air_below)) * (1.0 / (1.0 + distance * distance * (aside * aside + 1.0 / (VIEW_BEAM_MIXED * VIEW_BEAM_MIXED))));
+}
+
 // Upwards from below the layer.
 view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 {
@@ -355,6 +399,13 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
 	float footprint = camera_footprint(t, cos_view);
+#if VIEW_SOLVED
+	// The paper's model knows a plane base alone.
+	side_view side = side_view_at(place, vec2(direction), cos_view);
+	vec2 seen = side.place;
+#else
+	vec2 seen = place;
+#endif
 	vec3 layer = vec3(0.0, 1.0, 0.0);
 #if VIEW_PROJECTION != 1
 	// A fisheye's footprint is as long as the strip.
@@ -362,8 +413,16 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 		layer = field_thickness_along(place, vec2(direction), footprint, cos_view, extinction_scaled.y);
 	else
 #endif
-		layer.x = layer.z = view_thickness(place, footprint);
-	view_point p = view_point_at(direction, layer.x, layer.z, height_smooth(place, footprint), cos_view, view_sun_cosine(direction, t, base));
+		layer.x = layer.z = view_thickness(seen, footprint);
+#if VIEW_SOLVED
+	side_lit lit = side_lit_at(side, footprint, layer.x, layer.z);
+	view_point p = view_point_at(direction, lit.thickness, lit.inside, lit.smooth_m, cos_view, view_sun_cosine(direction, t, base));
+	p.smooth_thickness = lit.smooth_m;
+	p.sun = lit.sun;
+	p.received = lit.light;
+#else
+	view_point p = view_point_at(direction, layer.x, layer.z, layer.z, cos_view, view_sun_cosine(direction, t, base));
+#endif
 	p.single = layer.y;
 
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
@@ -376,7 +435,7 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	parts.sun_direct *= exp(-vec3(extinction) * (p.thickness / p.mu_v));
 #endif
 	parts.sky = max(vec3(textureLod(sky_total, air, 0.0)) - near, vec3(0.0)) * parts.transmittance;
-	parts.air = near * vec3(air_below) + (vec3(1.0) - to_layer) * vec3(air_around);
+	parts.air = near * (vec3(air_below) + view_air_beside(parts.transmittance, p.half_angle, t)) + (vec3(1.0) - to_layer) * vec3(air_around);
 	parts.distance = p.thickness > 0.01 ? t : 0.0;
 	return parts;
 }

@@ -12,7 +12,6 @@ uniform sampler2D up_air;
 uniform sampler2D up_sun;
 uniform sampler2D up_first;
 uniform sampler2D up_light;
-uniform sampler2D smooth_packed;
 #endif
 
 // Columns over the azimuth from the sun and rows over the elevation, as those of the sky's table above the horizon; the light's table holds one such
@@ -140,30 +139,14 @@ vec3 up_first_at(vec2 half_angle, float s)
 	return vec3(textureLod(up_first, (unit * (UP_FIRST_SIZE - 1.0) + 0.5) / UP_FIRST_SIZE, 0.0));
 }
 
-// slab_single_transmitted out of exp(-tau/mu_l) and exp(-tau/mu_v).
-vec3 up_single(vec3 tau, float mu_l, float mu_v, vec3 along_light, vec3 along_view)
+// slab_single_transmitted out of the optical thicknesses along view and light and what they let through.
+vec3 up_single(vec3 view, vec3 light, vec3 along_light, vec3 along_view)
 {
-	vec3 x = tau * abs(1.0 / mu_v - 1.0 / mu_l);
+	vec3 x = abs(view - light);
 	vec3 larger = max(along_light, along_view);
 	vec3 series = larger * (vec3(1.0) - x * (0.5 - x * (1.0 / 6.0)));
 	vec3 exact = (larger - min(along_light, along_view)) / max(x, vec3(1e-6));
-	return tau / mu_v * mix(exact, series, lessThan(x, vec3(0.01)));
-}
-
-// Thickness evened out over the way that light goes sideways, m. octaves: by which the footprint is larger than a texel of it.
-float up_smooth_thickness_at(vec2 place, float octaves)
-{
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
-#ifdef FIELD_NEAR
-	return packed_linear(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), 0.0);
-#else
-	return packed_linear_between(smooth_packed, uv, int(HEIGHT_SIZE_SMOOTH), octaves);
-#endif
-}
-
-float up_smooth_thickness(vec2 place, float footprint)
-{
-	return up_smooth_thickness_at(place, log2(footprint * HEIGHT_SIZE_SMOOTH / cloud_layer.z));
+	return view * mix(exact, series, lessThan(x, vec3(0.01)));
 }
 
 // What arrives along a ray that meets the layer from below, W/m2/nm/sr. disc: radiance of the sun's disc in the pixel (shaders/lib/sun_disc.glsl).
@@ -172,21 +155,22 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 air = sky_table_coordinates(direction);
 	vec2 unit = up_unit(air);
 	up_ray ray = up_ray_of(direction);
+	side_view side = side_view_at(ray.place, vec2(direction), ray.mu_v);
 #ifdef FIELD_ALONG
 	vec3 layer = field_thickness_along(ray.place, vec2(direction), ray.footprint, ray.mu_v, extinction_scaled.y);
 #if FIELD_ALONG == 2
 	if (ray.mu_v >= FIELD_ALONG_COSINE)
-		layer = vec3(1.0, 0.0, 1.0) * field_thickness(ray.place, ray.footprint) + vec3(0.0, 1.0, 0.0);
+		layer = vec3(1.0, 0.0, 1.0) * field_thickness(side.place, ray.footprint) + vec3(0.0, 1.0, 0.0);
 #endif
 	float thickness = layer.x;
 	float inside = layer.z;
 #else
-	float thickness = field_thickness(ray.place, ray.footprint);
+	float thickness = field_thickness(side.place, ray.footprint);
 	float inside = thickness;
 #endif
-	float spread = slab_light.w * inside;
-	float smooth_thickness = mix(inside, up_smooth_thickness(ray.place, ray.footprint), spread / (1.0 + spread));
-	float depth_unit = up_depth_unit(smooth_thickness);
+	side_lit lit = side_lit_at(side, ray.footprint, thickness, inside);
+	thickness = lit.thickness;
+	float depth_unit = up_depth_unit(lit.smooth_m);
 
 	vec4 sky = textureLod(up_sky, air, 0.0);
 	vec4 near = textureLod(up_air, air, 0.0);
@@ -195,10 +179,11 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 
 	vec3 tau = vec3(extinction_scaled) * thickness;
 	vec3 along_view = exp(-tau / ray.mu_v);
-	vec3 along_light = exp(-tau / ray.mu_l);
+	float along_sun = (lit.sun + 1e-3) / ray.mu_l;
+	vec3 along_light = exp(-vec3(extinction_scaled) * along_sun);
 	vec2 half_angle = scattering_half_angle(-vec3(sun_direction), -direction);
-	vec3 first = up_first_at(half_angle, solved_mean_depth(tau.y / ray.mu_l, tau.y / ray.mu_v)) *
-	             up_single(tau, ray.mu_l, ray.mu_v, along_light, along_view);
+	vec3 first = up_first_at(half_angle, solved_mean_depth(extinction_scaled.y * along_sun, tau.y / ray.mu_v)) *
+	             up_single(tau / ray.mu_v, vec3(extinction_scaled) * along_sun, along_light, along_view);
 #ifdef FIELD_ALONG
 	first *= layer.y;
 #endif
@@ -206,8 +191,10 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec3 received = vec3(textureLod(cloud_received, ray.place / cloud_layer.z, 0.0));
 	vec3 diffuse = to_layer * (vec3(sky_irradiance_cloud) * light.w + received * (1.0 - light.w)) * (1.0 / PI);
 	vec3 met = vec3(1.0) - along_view;
-	vec3 radiance = vec3(near) + vec3(sky) * along_view + met * diffuse +
-	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * vec3(light));
+	vec3 clear = (vec3(near) - (vec3(1.0) - to_layer) * vec3(air_around)) / max(vec3(air_below), vec3(1e-4)); // what was tabled, without clouds
+	vec3 beside = clear * view_air_beside(along_view, half_angle, ray.distance);
+	vec3 radiance = vec3(near) + beside + vec3(sky) * along_view + met * diffuse +
+	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * lit.light * vec3(light));
 #ifndef FIELD_NEAR
 #if VIEW_LARGE_SUN
 	disc *= exp(-vec3(extinction) * (thickness / ray.mu_v));

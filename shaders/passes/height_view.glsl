@@ -1,5 +1,6 @@
 // What each pixel sees of the height field, which lies below the camera. 0: x mean distance, m; y way through cloud, m; z thickness there, m; w the thickness
 // evened out. arguments[0].z: row of the picture that is the first here. 1: x, y slopes to the east and to the north; z share of the beam that comes there; w what often scattered light has received.
+#define FIELD_WARPED 1
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/height_march.glsl"
 #include "shaders/lib/height_sun.glsl"
@@ -39,13 +40,14 @@ height_surface height_surface_at(vec3 direction, float t)
 	float footprint = camera_position.w * t * inversesqrt(clamp(-direction.z, 0.04, 1.0));
 	float height = height_at(place, footprint);
 	float shadow_edge = HEIGHT_SHADOW_SOFT * footprint;
-	vec2 uv = (place - vec2(cloud_drift.x, cloud_drift.y)) / cloud_layer.z;
+	vec2 drifting = field_place(place);
+	vec2 uv = drifting / cloud_layer.z;
 	vec4 light = textureLod(height_light, uv, max(log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z), 0.0));
 	vec2 slope = vec2(light);
 	float received = light.w;
 #if HEIGHT_NEAR
 	float scale = height_puff_scale(height);
-	vec4 puff = height_puff(place - vec2(cloud_drift.x, cloud_drift.y), height_of_ray(direction.z, t), max(footprint, HEIGHT_PUFF_FINEST));
+	vec4 puff = height_puff(drifting, height_of_ray(direction.z, t), max(footprint, HEIGHT_PUFF_FINEST));
 	// The surface bulges on flanks, too.
 	slope = (slope + scale * vec2(puff.y, puff.z)) / max(1.0 - scale * puff.w, 0.4);
 	height += scale * puff.x;

@@ -31,10 +31,11 @@ const int KIND_OPTICAL_THICKNESS = 12;
 const int KIND_DISTANCE = 13;
 
 // Processors that run pixels in step with each other do everything for all of them or none, so that what happens seldom is done seldom: so many scatterings before the ends of
-// flights are looked at, so many turns of searches before a scattering, so many steps before a turn.
-const int REFERENCE_SCATTERINGS = 4;
-const int REFERENCE_TURNS = 2;
+// flights are looked at and a search for the sun is begun, so many steps before a scattering.
+const int REFERENCE_SCATTERINGS = 8;
 const int REFERENCE_STEPS = 2;
+// Searches for the sun are left to chance where they are expected to bring less than its inverse, of which a path brings some.
+const float REFERENCE_PATIENCE = 4.0;
 
 struct reference_sums {
 	vec3 light; // of this sample, in the bands
@@ -143,6 +144,8 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.cloudy = 0;
 	path.looked = vec2(1.0);
 	path.mean = 0.0;
+	path.whole = 0.0;
+	path.pick_sum = 0.0;
 	sums.light = vec3(0.0);
 	sums.certain = vec3(0.0);
 	float h = camera_position.z;
@@ -167,44 +170,64 @@ void reference_resume(INOUT(light_path) path)
 {
 	path.place = path.kept_place;
 	path.direction = path.kept_direction;
-	path.mode = path.share.x + path.share.y + path.share.z > 0.0 ? PATH_LAYER : PATH_DONE;
+	path.mode = path.kept_mode;
 }
 
-// A scattering in cloud.
+// A scattering in cloud. Of those since the last search for the sun one is drawn for the next (Talbot, Cline and Egbert 2005, "Importance Resampling for Global Illumination"): by
+// the phase function, bounded since the peak is blurred on the way, and by the way straight up to the top here.
 void reference_scatter(INOUT(light_path) path)
 {
 	path.ratio *= vec3(extinction) / path_of_hero(vec3(extinction), path.hero);
-	vec3 before = path.direction;
-	float height = path_height(path.place);
-	float mu_sun = clamp(dot(path_up(path.place), vec3(sun_direction)), -1.0, 1.0);
-	vec3 weight = path_sun_begin(path, path.place, height, mu_sun);
-	vec3 to_sun = path.direction;
-	vec2 half_angle = scattering_half_angle(before, to_sun);
-	bool forward = half_angle.x < FORWARD_PEAK_SINE;
-	bool counts = !forward || (path.straight && path.left == 0);
-	path.sun = weight * phase_full(half_angle) * (0.25 / PI) * sun_irradiance(height, mu_sun);
-	path.kind = reference_kind(path, forward ? KIND_ORDER0 : KIND_ORDER0 + min(path.turns + 1, 3));
-	path.direction = before;
+	vec3 sun = vec3(sun_direction);
+	float mu_sun = clamp(dot(path_up(path.place), sun), -1.0, 1.0);
+	float over = max(path.top + cloud_layer.x - path_height(path.place), 0.0);
+	float passes = exp(-min(extinction_modified.y * over / max(mu_sun, 0.1), 2.5));
+	float worth = passes * (min(phase_full(scattering_half_angle(path.direction, sun)).y, 15.0) + 0.2);
+	path.pick_sum += worth;
+	if (path_random(path) * path.pick_sum < worth) {
+		path.pick_place = path.place;
+		path.pick_direction = path.direction;
+		path.pick_ratio = path.ratio;
+		path.pick_worth = worth;
+		path.pick_passes = passes;
+		path.pick_kind = KIND_ORDER0 + min(path.turns + 1, 3);
+		path.pick_straight = path.straight;
+	}
 	float share = path_random(path);
 	float around = path_random(path);
 	path_scatter(path, share, around);
 	path.lifted = false;
+	path.mode = PATH_LAYER;
+}
+
+// The scattering that was drawn looks for the sun.
+void reference_look(INOUT(light_path) path)
+{
+	float height = path_height(path.pick_place);
+	float mu_sun = clamp(dot(path_up(path.pick_place), vec3(sun_direction)), -1.0, 1.0);
 	path.kept_place = path.place;
 	path.kept_direction = path.direction;
-	path.mode = PATH_LAYER;
-	if (counts && path.sun.x + path.sun.y + path.sun.z > 0.0) {
-		path.mode = PATH_SUN;
-		path.direction = to_sun;
-	}
+	path.kept_mode = path.mode;
+	vec3 weight = path_sun_begin(path, path.pick_place, height, mu_sun, path.pick_ratio, REFERENCE_PATIENCE * path.pick_sum / path.pick_passes);
+	vec2 half_angle = scattering_half_angle(path.pick_direction, path.direction);
+	bool forward = half_angle.x < FORWARD_PEAK_SINE;
+	bool counts = !forward || (path.pick_straight && path.left == 0);
+	path.sun = weight * phase_full(half_angle) * (0.25 / PI * path.pick_sum / path.pick_worth) * sun_irradiance(height, mu_sun);
+	path.kind = reference_kind(path, forward ? KIND_ORDER0 : path.pick_kind);
+	path.pick_sum = 0.0;
+	path.place = path.pick_place;
+	path.mode = PATH_SUN;
+	if (!counts || !(path.sun.x + path.sun.y + path.sun.z > 0.0))
+		reference_resume(path);
 }
 
 // The first one.
-void reference_meet_cloud(INOUT(light_path) path, INOUT(reference_sums) sums)
+void reference_meet_cloud(INOUT(light_path) path, INOUT(reference_sums) sums, vec3 disc)
 {
 #if REFERENCE_ABOVE
 	reference_keep(sums, KIND_OPTICAL_THICKNESS, vec3(extinction.y * path.top));
 #endif
-	reference_first(path, sums, 0, vec3(0.0));
+	reference_first(path, sums, 0, disc);
 }
 
 #if VIEW_GROUND == 2
@@ -275,7 +298,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float footprint = path.first ? camera_position.w * t * pow(mu_v, -0.75) : 20.0;
 	bool again = !path.first;
 	path.grounded = path.first ? 2 : max(path.grounded, 1);
-	vec2 detail = vec2(1.0);
+	vec3 detail = vec3(1.0, 1.0, 0.0);
 	vec2 there = vec2(path.place) + vec2(camera_position);
 	ground_point point;
 	point.offset = vec2(path.place);
@@ -283,16 +306,19 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	point.mu_v = mu_v;
 	point.mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
 #if VIEW_GROUND == 2
-	vec3 reflectance = ground_reflectance(there, footprint);
+	vec3 reflectance = ground_reflectance_seen(there, footprint);
 #else
 	// What the camera itself sees has all that the slab's view shows of it.
 	if (path.first)
 		detail = ground_detail(point);
 #if VIEW_GROUND == 3
-	vec3 reflectance = ground_ice(ground_reflectance(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
+	vec3 reflectance = ground_ice(ground_reflectance_seen(there + (path.first ? ground_ragged(point) : vec2(0.0)), footprint), footprint);
 #else
-	vec3 reflectance = ground_reflectance(there, footprint);
+	vec3 reflectance = ground_reflectance_seen(there, footprint);
 #endif
+#endif
+#if VIEW_GROUND == 1
+	reflectance = ground_drier(reflectance, detail.z);
 #endif
 	reference_first(path, sums, 1, vec3(0.0));
 #if VIEW_GROUND == 2
@@ -305,7 +331,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float base = cloud_layer.x;
 	float mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
 	vec3 entry = path.place + vec3(sun_direction) * sphere_distance_up(0.0, max(mu_sun, 0.0), base);
-	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01)) * sun_irradiance(0.0, mu_sun);
+	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01), path.ratio, 4.0) * sun_irradiance(0.0, mu_sun);
 	float mu_out = dot(up, path.direction);
 	vec3 seen_in = vec3(detail.x * max(mu_out, 0.0) / PI);
 #if VIEW_GROUND == 2
@@ -329,6 +355,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	// Light from the ground to clouds is a small part of what a path shows; on the ground that the camera sees it is most.
 	float most = again ? clamp(max(path.share.x, max(path.share.y, path.share.z)), 0.02, 1.0) : 1.0;
 	path.share *= path_random(path) < most ? 1.0 / most : 0.0;
+	path.kept_mode = path.share.x + path.share.y + path.share.z > 0.0 ? PATH_LAYER : PATH_DONE;
 	if (mu_out > 1e-3 && path.sun.x + path.sun.y + path.sun.z > 0.0) {
 		path.mode = PATH_SUN;
 		path.place += path.direction * sphere_distance_up(0.0, mu_out, base);
@@ -363,7 +390,7 @@ void reference_leave(INOUT(light_path) path, INOUT(reference_sums) sums, vec3 di
 // --- flights ---
 
 // A step through the layer: to the next place where something may happen.
-void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
+void reference_step(INOUT(light_path) path)
 {
 	bool searches = path.mode == PATH_SUN;
 	float largest = path_largest_extinction();
@@ -372,7 +399,7 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 	// Nothing stands so high around here: on to where it might, or to where the search expects cloud.
 	int part = path_part_at(path.arc / path.reach);
 	bool empty = over > 1.0 && !(searches && path_part_cloudy(path.cloudy, part));
-	float reach = cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
+	float reach = field_warp_reach(vec2(path.place) / cloud_layer.z) * cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
 	float t = -log(path_random(path)) / largest;
 	if (empty) {
 		t = mu < 0.0 ? min(reach, over / -mu) : reach;
@@ -390,12 +417,7 @@ void reference_step(INOUT(light_path) path, INOUT(reference_sums) sums)
 	path.top = path_top(path.place);
 	bool inside = height >= 0.0 && height < path.top;
 	if (height < 0.0 || height > cloud_layer.y) {
-		if (searches) {
-			reference_add(sums, path.kind, path_sun_arrives(path));
-			reference_resume(path);
-		} else {
-			path.mode = PATH_LEAVES;
-		}
+		path.mode = searches ? PATH_ARRIVES : PATH_LEAVES;
 	} else if (searches) {
 		if (!collided && inside)
 			path.mode = PATH_TURNS;
@@ -432,20 +454,24 @@ void pass(ivec2 pixel)
 		if (path.mode == PATH_START)
 			reference_start(path, sums, pixel, number);
 		for (int i = 0; i < REFERENCE_SCATTERINGS; i++) {
-			for (int k = 0; k < REFERENCE_TURNS; k++) {
-				for (int m = 0; m < REFERENCE_STEPS; m++)
-					if (path.mode == PATH_LAYER || path.mode == PATH_SUN)
-						reference_step(path, sums);
-				if (path.mode == PATH_TURNS)
-					path_sun_turns(path);
-			}
+			for (int k = 0; k < REFERENCE_STEPS; k++)
+				if (path.mode == PATH_LAYER || path.mode == PATH_SUN)
+					reference_step(path);
+			if (path.mode == PATH_TURNS)
+				path_sun_turns(path);
 			// The first is left to the end of this, for all that comes with it.
 			if (path.mode == PATH_SCATTERS && !path.first)
 				reference_scatter(path);
 		}
+		if (path.mode == PATH_ARRIVES) {
+			reference_add(sums, path.kind, path_sun_arrives(path));
+			reference_resume(path);
+		} else if (path.pick_sum > 0.0 && path.mode != PATH_SUN && path.mode != PATH_TURNS) {
+			reference_look(path);
+		}
 		if (path.mode == PATH_SCATTERS && path.first)
-			reference_meet_cloud(path, sums);
-		if (path.mode == PATH_LEAVES)
+			reference_meet_cloud(path, sums, disc);
+		if (path.mode == PATH_LEAVES && path.pick_sum == 0.0)
 			reference_leave(path, sums, disc);
 		if (path.mode == PATH_DONE) {
 			// Weights of ways to a sun at the horizon can leave the range of numbers.

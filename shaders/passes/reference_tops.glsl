@@ -1,5 +1,5 @@
 // Heights of the tops above the base for the reference model, in the frame of the drifting clouds: those that the slab shows, fine. arguments[0].x: texels a side.
-#include "shaders/lib/scene_block.glsl"
+#include "shaders/lib/field_warp.glsl"
 #if REFERENCE_ABOVE
 #include "shaders/lib/height.glsl"
 #else

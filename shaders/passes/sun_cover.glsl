@@ -1,4 +1,5 @@
 // What the layer leaves of the sun's beam on its way to the camera below it, over the disc (struct sun_cover). arguments[0]: a, side; arguments[1]: b.
+#define FIELD_WARPED 1
 #include "shaders/lib/field.glsl"
 #include "shaders/lib/sphere.glsl"
 

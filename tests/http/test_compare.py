@@ -275,6 +275,7 @@ def test_black_ground_at_night_has_no_figures(daemon):
     ({"variants": [{}, {"model": {"shading": "none"}}]}, {"/variants/1/model/shading"}),
     ({"variants": [{}, {"clouds": {"coverage": 2}}]}, {"/variants/1/clouds/coverage"}),
     ({"variants": [{}, {"moon": {}, "name": "x"}]}, {"/variants/1/moon"}),
+    ({"scene": {"name": "x"}, "variants": [{}, {"name": "y", "model": {"shading": "paper"}}]}, {"/scene/name"}),
     ({"variants": [{}, {"clouds": {"base_m": 1}, "camera": {"position_m": [0, 0, -1]}, "name": "x"}]},
      {"/variants/1/clouds/base_m", "/variants/1/camera/position_m/2"}),
     ({"scene": {"camera": {"position_m": [0, 0, 300]}}, "variants": [{}, {"clouds": {"base_m": 200}, "name": "x"}]},

@@ -13,6 +13,7 @@
 	X(ground_albedo)                                                                                                                   \
 	X(ground_patch)                                                                                                                    \
 	X(ground_mean_albedo)                                                                                                              \
+	X(ground_region)                                                                                                                   \
 	X(camera_position)                                                                                                                 \
 	X(camera_right)                                                                                                                    \
 	X(camera_up)                                                                                                                       \
@@ -22,6 +23,7 @@
 	X(cloud_layer)                                                                                                                     \
 	X(cloud_field)                                                                                                                     \
 	X(cloud_drift)                                                                                                                     \
+	X(cloud_warp)                                                                                                                      \
 	X(cloud_puffs)                                                                                                                     \
 	X(cloud_puffs_drift)                                                                                                               \
 	X(cloud_detail)                                                                                                                    \

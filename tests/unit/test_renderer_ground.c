@@ -207,6 +207,32 @@ static void horizon_is_no_stair(void **state)
 	}
 }
 
+/* No line under the horizon, whichever way the camera looks: none of the last rows of the land is brighter or darker than those above and
+ * below it. From 2 m the air of the 5 km to the horizon hides a third of it, so that an edge to the sky remains. */
+static void land_ends_without_lines(void **state)
+{
+	(void)state;
+	enum { FIRST = 31, ROWS = 8 };
+	double worst = 0;
+	for (int i = 0; i < 6; i++) {
+		struct scene scene = small_scene(200, 60, LAYER(COLOR));
+		scene.clouds.type = CLOUD_NONE;
+		scene.camera.azimuth_deg = 60 * i + 10;
+		scene.camera.elevation_deg = 0;
+		scene.camera.vertical_fov_deg = 4; /* pixels as large as those of the default picture */
+		struct frame frame = render(&scene);
+		double row[ROWS] = {0};
+		for (int k = 0; k < ROWS; k++)
+			for (int x = 0; x < frame.width; x++)
+				row[k] += luminance_of(&frame, LAYER_COLOR, x, FIRST + k) / frame.width;
+		for (int k = 1; k + 1 < ROWS; k++)
+			worst = fmax(worst, fabs(row[k] / (0.5 * (row[k - 1] + row[k + 1])) - 1));
+		frame_finish(&frame);
+	}
+	print_message("a row under the horizon differs from its neighbours by %.3f at most\n", worst);
+	assert_true(worst < 0.16);
+}
+
 /* --- the sea ------------------------------------------------------------------------------------------------------------------------- */
 
 static double mean_ground(const struct scene *scene, int rows)
@@ -331,6 +357,7 @@ int main(void)
 		cmocka_unit_test(shadows_lie_where_the_parallax_says),
 		cmocka_unit_test(shadows_are_the_same_from_below_and_above),
 		cmocka_unit_test(horizon_is_no_stair),
+		cmocka_unit_test(land_ends_without_lines),
 		cmocka_unit_test(sea_glitters_below_the_sun),
 		cmocka_unit_test(sea_mirrors_the_deck),
 	};

@@ -355,6 +355,50 @@ static void fisheye_is_black_outside(void **state)
 	frame_finish(&frame);
 }
 
+/* Share of a pixel inside the circle, by a grid of points. */
+static double share_inside(int side, int column, int row)
+{
+	enum { STEPS = 16 };
+	int inside = 0;
+	for (int i = 0; i < STEPS * STEPS; i++)
+		inside += hypot(column + (i % STEPS + 0.5) / STEPS - 0.5 * side, row + (i / STEPS + 0.5) / STEPS - 0.5 * side) < 0.5 * side;
+	return (double)inside / (STEPS * STEPS);
+}
+
+/* Linear light of a pixel of a PNG. */
+static double light_of_codes(const struct frame *frame, int column, int row)
+{
+	const unsigned char *rgb = (const unsigned char *)frame->pixels + 3 * ((size_t)row * (size_t)frame->width + (size_t)column);
+	const double x = rgb[1] / 255.0;
+	return x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
+}
+
+/* Developed pictures end with the circle, not with the last pixel whose middle it holds: no stairs. */
+static void fisheye_ends_softly(void **state)
+{
+	(void)state;
+	enum { SIDE = 200 };
+	struct scene scene = panorama(PROJECTION_FISHEYE, SIDE, LAYER(COLOR));
+	scene.clouds.type = CLOUD_STRATUS;
+	scene.clouds.coverage = 1;
+	scene.output.format = IMAGE_PNG;
+	scene.output.bits = 8;
+	struct frame frame = render(&scene);
+	double worst = 0;
+	for (int row = 0; row < SIDE; row++)
+		for (int column = 0; column < SIDE; column++) {
+			const double x = column + 0.5 - 0.5 * SIDE, y = row + 0.5 - 0.5 * SIDE, from_middle = hypot(x, y);
+			const double inwards = 1 - 3 / from_middle, share = share_inside(SIDE, column, row);
+			if (fabs(from_middle - 0.5 * SIDE) > 2)
+				continue;
+			const double beside = light_of_codes(&frame, (int)(0.5 * SIDE + inwards * x), (int)(0.5 * SIDE + inwards * y));
+			worst = fmax(worst, fabs(light_of_codes(&frame, column, row) / beside - share));
+		}
+	frame_finish(&frame);
+	print_message("light at the rim over that beside it is the share inside within %.3f\n", worst);
+	assert_true(worst < 0.15);
+}
+
 /* --- integrals ---------------------------------------------------------------------------------------------------------------------- */
 
 /* A horizontal plane under a clear sky: the panorama's cosine integral beside the figures of the frame, which the sky stage integrated by
@@ -409,6 +453,7 @@ int main(void)
 		cmocka_unit_test(equirectangular_wraps),
 		cmocka_unit_test(projections_show_the_same),
 		cmocka_unit_test(fisheye_is_black_outside),
+		cmocka_unit_test(fisheye_ends_softly),
 		cmocka_unit_test(panorama_holds_the_illuminance),
 		cmocka_unit_test(panoramas_agree_about_the_light),
 	};

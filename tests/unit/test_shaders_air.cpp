@@ -184,6 +184,40 @@ static void air_slantwise(void **)
 	assert_near((double)horizon.y / rayleigh_thickness[1], std::sqrt(M_PI * earth * 9200 / 2) / rayleigh_column, 1.5);
 }
 
+/* Way through air whose density falls off by one exponential, over its scale height: Chapman's function for large x = R/H (Green and Martin
+ * 1966). */
+static double chapman(double scale, double cosine)
+{
+	const double x = earth / scale, y = cosine * std::sqrt(x / 2);
+	return std::sqrt(M_PI * x / 2) * std::exp(y * y) * std::erfc(y);
+}
+
+/* The sun near the horizon: its ways through air after Kasten and Young 1989, which are bent, at 1 degree by enough to be some percent
+ * longer than straight ones; and through haze after Chapman. By them the red that its light is left with. */
+static void low_suns_redden(void **)
+{
+	double before = 0;
+	for (double elevation : {10., 5., 3., 1.}) {
+		const double sine = std::sin(elevation * M_PI / 180);
+		const double mass = 1 / (sine + 0.50572 * std::pow(elevation + 6.07995, -1.6364)), haze_mass = chapman(1200, sine);
+		const float end = sphere_distance_up(0, (float)sine, ATMOSPHERE_HEIGHT);
+		set_clean_air(0);
+		const vec4 clean = atmosphere_optical_thickness(0, (float)sine, end, 4000);
+		set_clean_air(0.1);
+		const vec4 hazy = atmosphere_optical_thickness(0, (float)sine, end, 4000);
+		const double bent = elevation < 2 ? 0.06 : 0.03;
+		assert_near(clean.y / rayleigh_thickness[1] / mass, 1, bent);
+		assert_near((hazy.y - clean.y) / 0.1 / haze_mass, 1, 0.01);
+		/* Red over blue, as an optical thickness: bands differ by what Rayleigh's law says. */
+		const double reddening = (double)(clean.z - clean.x);
+		assert_near(reddening / (mass * (rayleigh_thickness[2] - rayleigh_thickness[0])), 1, bent);
+		assert_true(reddening > before);
+		before = reddening;
+	}
+	/* At 1 degree red passes 50 times better than blue. */
+	assert_in_range((int)std::exp(before), 50, 90);
+}
+
 /* Integral over the sphere of a function of the scattering angle's cosine, and of that times the cosine. */
 template <class Function> static void moments(Function function, double &norm, double &mean)
 {
@@ -481,6 +515,7 @@ int main()
 		cmocka_unit_test(air_straight_up),
 		cmocka_unit_test(rayleigh_follows_the_density_of_air),
 		cmocka_unit_test(air_slantwise),
+		cmocka_unit_test(low_suns_redden),
 		cmocka_unit_test(phase_functions_are_normalised),
 		cmocka_unit_test(aerosol_moments_are_integrals),
 		cmocka_unit_test(aerosol_parts_keep_the_energy),

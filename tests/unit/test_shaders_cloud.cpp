@@ -1,5 +1,6 @@
 /* The GLSL library compiled for the processor: slab, phase table, colour and noise, against independent values. */
 extern "C" {
+#include "renderer/image/develop.h"
 #include "renderer/stages/colour.h"
 #include "renderer/stages/slab_tables.h"
 }
@@ -230,6 +231,71 @@ static void filmic_curve_rises(void **)
 	assert_near(colour_filmic(0), 0, 0);
 	assert_near(colour_filmic(0.18f), 0.15, 0.01);
 	assert_near(colour_filmic(2), 0.79, 0.01);
+	/* The shoulder keeps grades: what is five times white, forty times, and the sun's disc are several codes apart. */
+	assert_near(colour_filmic(5), 0.91, 0.01);
+	assert_true(colour_srgb(colour_filmic(40)) * 255 < 251);
+	assert_true(colour_srgb(colour_filmic(1e5f)) * 255 > 254.4f);
+}
+
+static vec3 linear_of(double x, double y)
+{
+	/* CIE xyY to linear Rec.709 (IEC 61966-2-1), of luminance 1. */
+	const double X = x / y, Z = (1 - x - y) / y;
+	return vec3((float)(3.2406 * X - 1.5372 - 0.4986 * Z), (float)(-0.9689 * X + 1.8758 + 0.0415 * Z),
+		    (float)(0.0557 * X - 0.2040 + 1.0570 * Z));
+}
+
+/* The sun at 20, 10, 5 and 2 degrees by a spectrum (docs/validation/sky.md), as bright as its disc is: the lower the warmer, never white
+ * but when high. */
+static void suns_keep_their_hue(void **)
+{
+	const double suns[][3] = {{0.356, 0.367, 5e5}, {0.387, 0.391, 4e5}, {0.439, 0.419, 2e5}, {0.521, 0.428, 3e4}};
+	float blue = 1, green = 1;
+	for (const double *sun : suns) {
+		const vec3 shown = colour_filmic_hue(colour_into_gamut(linear_of(sun[0], sun[1])) * (float)sun[2] * COLOUR_FILM_BALANCE);
+		assert_true(shown.x > 0.98f && shown.x <= 1);
+		assert_true(shown.x >= shown.y && shown.y >= shown.z);
+		assert_true(shown.y < green && shown.z < blue);
+		green = shown.y;
+		blue = shown.z;
+	}
+	/* Codes of 8 bits: that at 2 degrees is orange, not yellow, not red. */
+	assert_true(colour_srgb(green) < 0.93f && colour_srgb(green) > 0.75f);
+	assert_true(colour_srgb(blue) < 0.75f && colour_srgb(blue) > 0.4f);
+}
+
+/* More light of one colour is never shown darker by more than a code or two, and white stays white. */
+static void brighter_is_brighter(void **)
+{
+	const vec3 weights(0.2126f, 0.7152f, 0.0722f);
+	for (vec3 colour : {vec3(1), vec3(1, 0.7f, 0.3f), vec3(1, 0.3f, 0.02f), vec3(0.4f, 0.6f, 1), vec3(1, 0, 0)}) {
+		float before = 0;
+		for (int i = -60; i < 180; i++) {
+			const vec3 shown = colour_filmic_hue(colour * std::exp2((float)i * 0.1f));
+			const float code = 255 * colour_srgb(glm::dot(shown, weights));
+			assert_true(shown.x >= 0 && shown.y >= 0 && shown.z >= 0 && shown.x <= 1 && shown.y <= 1 && shown.z <= 1);
+			assert_true(code > before - 0.3f);
+			before = code;
+			if (colour == vec3(1)) {
+				assert_near(shown.x, shown.z, 1e-6);
+				assert_near(shown.x, colour_filmic(1.002f * std::exp2((float)i * 0.1f)), 1e-5);
+			}
+		}
+	}
+}
+
+/* The tone of pictures that are in memory already is the same. */
+static void processor_tones_alike(void **)
+{
+	for (float light : {0.05f, 0.7f, 3.f, 30.f, 2e4f})
+		for (vec3 colour : {vec3(1), vec3(1, 0.7f, 0.3f), vec3(1, 0.2f, -0.02f), vec3(0.4f, 0.6f, 1)}) {
+			const vec3 rgb = colour * light, shown = colour_filmic_hue(colour_into_gamut(rgb) * COLOUR_FILM_BALANCE);
+			const float pixel[3] = {rgb.x, rgb.y, rgb.z};
+			unsigned char codes[3];
+			develop_picture(pixel, 1, 0, TONE_FILMIC, codes);
+			for (int c = 0; c < 3; c++)
+				assert_near(codes[c], 255 * colour_srgb(shown[c]), 0.51);
+		}
 }
 
 static void gamut_keeps_luminance(void **)
@@ -256,6 +322,9 @@ int main()
 		cmocka_unit_test(bands_become_colours),
 		cmocka_unit_test(srgb_curve),
 		cmocka_unit_test(filmic_curve_rises),
+		cmocka_unit_test(suns_keep_their_hue),
+		cmocka_unit_test(brighter_is_brighter),
+		cmocka_unit_test(processor_tones_alike),
 		cmocka_unit_test(gamut_keeps_luminance),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -1,4 +1,4 @@
-/* The sea and the ground close by: Fresnel, slopes, glitter and waves against closed forms and published values, compiled for the
+/* The sea and the ground as they are seen: Fresnel, slopes, glitter and waves against closed forms and published values, compiled for the
  * processor. No OpenGL. */
 extern "C" {
 #include "renderer/scene.h"
@@ -19,6 +19,7 @@ namespace glsl
 {
 namespace bare
 {
+#include "shaders/lib/ground.glsl"
 #include "shaders/lib/ground_near.glsl"
 #include "shaders/lib/sea.glsl"
 } // namespace bare
@@ -297,6 +298,52 @@ static void glitter_is_the_same_from_any_distance(void **)
 			}
 }
 
+/* From some kilometres up only the longest waves are longer than pixels, a few that stand out as stripes: they are roughness by then. */
+static void far_sea_has_no_stripes(void **)
+{
+	enum { PLACES = 4000 };
+	glsl::set_scene_block(waves_of(8, 0, 0));
+	for (double pixel = 5; pixel < 30; pixel *= 1.7) {
+		double square = 0;
+		for (int i = 0; i < PLACES; i++) {
+			const double u = i * 0.7548776662, v = i * 0.5698402910;
+			const vec2 place((float)(9000 * (u - std::floor(u))), (float)(9000 * (v - std::floor(v))));
+			const vec2 slope = sea_slopes_at(place, vec2(0, 1), (float)pixel, (float)(1.5 * pixel)).resolved;
+			square += (double)glm::dot(slope, slope) / PLACES;
+		}
+		const double share = square / (0.003 + 5.08e-3 * 8);
+		print_message("pixel %4.1f m: resolved share of the slopes' variance %.4f\n", pixel, share);
+		assert_true(share < 0.004);
+	}
+}
+
+/* Across the glitter seen from 4 km the mean over gusts is Cox and Munk's, and it breaks up: at its flanks light changes from place to
+ * place by more than in its middle. */
+static void glitter_breaks_up_at_its_edges(void **)
+{
+	enum { PLACES = 20000 };
+	glsl::set_scene_block(waves_of(8, 0, 0));
+	const sea_slopes rough = sea_slopes_at(vec2(0.0f), vec2(0, 1), 1e7f, 1e7f);
+	const vec3 to_viewer = direction(50, 0);
+	double deviation[7];
+	for (int k = 0; k < 7; k++) {
+		const vec3 to_sun = direction(50, 180 - 10 * k);
+		const double wanted = (double)sea_glint(rough, to_viewer, to_sun);
+		double mean = 0, square = 0;
+		for (int i = 0; i < PLACES; i++) {
+			const double u = i * 0.7548776662, v = i * 0.5698402910;
+			const vec2 place((float)(40000 * (u - std::floor(u))), (float)(40000 * (v - std::floor(v))));
+			const double found = (double)sea_glint(sea_slopes_at(place, vec2(0, 1), 6.0f, 10.0f), to_viewer, to_sun);
+			mean += found / PLACES;
+			square += found * found / PLACES;
+		}
+		deviation[k] = std::sqrt(square - mean * mean) / mean;
+		print_message("%2d degrees aside: %.5f, Cox and Munk %.5f, deviation %.3f\n", 10 * k, mean, wanted, deviation[k]);
+		assert_float_equal(mean, wanted, 0.06 * wanted + 1e-4);
+	}
+	assert_true(deviation[0] < 0.2 && deviation[4] > 1.2 * deviation[0]);
+}
+
 /* --- the ground close by ---------------------------------------------------------------------------------------------------------- */
 
 static void ground_noise_is_normalised(void **)
@@ -332,11 +379,17 @@ static void set_ground(double contrast, double slope, double stretch, double sun
 	glsl::camera_position = vec4(3000.0f, 4000.0f, 2.0f, 1.5e-3f);
 }
 
-/* Means of both factors over a ring of the ground, 1 wherever it lies and however low the sun. */
-template <typename Point, typename Detail> static void mean_detail(double distance, double sun_elevation, Detail detail, double mean[2])
+/* Of what the ground close by is multiplied with, over a ring of it. */
+struct detail_figures {
+	double beam, light, drier; /* means */
+	double contrast;           /* deviation of `light` */
+};
+
+template <typename Point, typename Detail> static detail_figures figures_of(double distance, double sun_elevation, Detail detail)
 {
 	enum { PLACES = 20000 };
-	mean[0] = mean[1] = 0;
+	detail_figures f = {};
+	double square = 0;
 	for (int i = 0; i < PLACES; i++) {
 		const double u = i * 0.7548776662, v = i * 0.5698402910;
 		const double azimuth = 2 * pi * (u - std::floor(u)), t = distance * (1 + 0.5 * (v - std::floor(v)));
@@ -348,31 +401,98 @@ template <typename Point, typename Detail> static void mean_detail(double distan
 		p.across = (float)(1.5e-3 * t);
 		p.mu_v = (float)(2 / std::hypot(t, 2.0));
 		p.mu_sun = (float)std::sin(sun_elevation * pi / 180);
-		const vec2 found = detail(p);
-		mean[0] += (double)found.x / PLACES;
-		mean[1] += (double)found.y / PLACES;
+		const vec3 found = detail(p);
+		f.beam += (double)found.x / PLACES;
+		f.light += (double)found.y / PLACES;
+		f.drier += (double)found.z / PLACES;
+		square += (double)found.y * (double)found.y / PLACES;
 	}
+	f.contrast = std::sqrt(square - f.light * f.light);
+	return f;
 }
 
+static detail_figures figures_of_bare(double distance, double sun_elevation)
+{
+	set_ground(0.16, 0.16, 1, sun_elevation);
+	return figures_of<ground_point>(distance, sun_elevation, [](const ground_point &p) { return ground_detail(p); });
+}
+
+static detail_figures figures_of_grown(double distance, double sun_elevation)
+{
+	using glsl::grown::ground_point;
+	set_ground(0.32, 0, 1, sun_elevation);
+	return figures_of<ground_point>(distance, sun_elevation, [](const ground_point &p) { return glsl::grown::ground_detail(p); });
+}
+
+/* The published albedos stay what they are, wherever the ring lies and however low the sun. */
 static void detail_changes_no_mean(void **)
 {
 	for (double distance = 3; distance < 5000; distance *= 6)
 		for (double elevation = 3; elevation < 90; elevation *= 3) {
-			double bare[2], grown[2];
-			set_ground(0.16, 0.16, 1, elevation);
-			mean_detail<ground_point>(
-				distance, elevation, [](const ground_point &p) { return ground_detail(p); }, bare);
-			set_ground(0.32, 0, 1, elevation);
-			mean_detail<glsl::grown::ground_point>(
-				distance, elevation, [](const glsl::grown::ground_point &p) { return glsl::grown::ground_detail(p); },
-				grown);
-			print_message("%6.0f m, sun %2.0f degrees: bare %.3f, %.3f; grown %.3f, %.3f\n", distance, elevation, bare[0],
-				      bare[1], grown[0], grown[1]);
-			for (int k = 0; k < 2; k++) {
-				assert_float_equal(bare[k], 1, 0.03);
-				assert_float_equal(grown[k], 1, 0.03);
-			}
+			const detail_figures bare = figures_of_bare(distance, elevation), grown = figures_of_grown(distance, elevation);
+			print_message("%6.0f m, sun %2.0f degrees: bare %.3f, %.3f; grown %.3f, drier by %.3f\n", distance, elevation,
+				      bare.beam, bare.light, grown.light, grown.drier);
+			assert_float_equal(bare.beam, 1, 0.03);
+			assert_float_equal(bare.light, 1, 0.03);
+			assert_float_equal(grown.beam, 1, 1e-6);
+			assert_float_equal(grown.light, 1, 0.03);
+			assert_float_equal(grown.drier, 0, 0.02);
 		}
+}
+
+/* Tufts are large against a pixel close by and small far away, where a pixel is the mean of many: what grows looks ever smoother. */
+static void grass_is_smooth_far_away(void **)
+{
+	const double close = figures_of_grown(10, 40).contrast, middle = figures_of_grown(100, 40).contrast,
+		     far = figures_of_grown(1000, 40).contrast;
+	print_message("contrast of grass at 10, 100, 1000 m: %.3f, %.3f, %.3f\n", close, middle, far);
+	assert_true(close > 0.15 && close < 0.5);
+	assert_true(middle < 0.8 * close && far < 0.6 * middle);
+}
+
+/* --- regions ------------------------------------------------------------------------------------------------------------------ */
+
+static void home_shows_the_picture_as_it_is(void **)
+{
+	for (int i = 0; i < 20000; i++) {
+		const double u = i * 0.7548776662, v = i * 0.5698402910;
+		const vec2 place((float)(u - std::floor(u)) - 0.25f, (float)(v - std::floor(v)) - 0.25f);
+		assert_float_equal(glm::length(ground_region_at(place) - vec3(place, 0.0f)), 0, 1e-6);
+	}
+}
+
+/* How alike the picture and the one a whole number of pictures away look, by the correlation of a pattern that repeats with the picture: 1
+ * where it only repeats, as it did. The share of any part of the picture in what is seen stays what it is. */
+static void picture_is_not_seen_to_repeat(void **)
+{
+	enum { SIDE = 160, PLACES = 12 * SIDE };
+	static double pattern[PLACES][SIDE];
+	double mean = 0, square = 0, tone = 0, tone_square = 0;
+	for (int x = 0; x < PLACES; x++)
+		for (int y = 0; y < SIDE; y++) {
+			const vec3 at = ground_region_at(vec2(20.0f + (float)x / SIDE, 7.0f + (float)y / SIDE));
+			pattern[x][y] = std::cos(2 * pi * (double)(3 * at.x + at.y)) + std::cos(2 * pi * (double)(2 * at.y - at.x));
+			mean += pattern[x][y] / (PLACES * SIDE);
+			square += pattern[x][y] * pattern[x][y] / (PLACES * SIDE);
+			tone += (double)at.z / (PLACES * SIDE);
+			tone_square += (double)at.z * (double)at.z / (PLACES * SIDE);
+		}
+	print_message("pattern: mean %.3f, variance %.3f; tone: mean %.3f, variance %.3f\n", mean, square, tone, tone_square);
+	assert_float_equal(mean, 0, 0.1);
+	assert_float_equal(square, 1, 0.1);
+	assert_float_equal(tone, 0, 0.15);
+	assert_float_equal(tone_square, 1, 0.3);
+	double all = 0;
+	for (int away = 1; away < 12; away++) {
+		double sum = 0;
+		for (int x = 0; x + away * SIDE < PLACES; x++)
+			for (int y = 0; y < SIDE; y++)
+				sum += pattern[x][y] * pattern[x + away * SIDE][y] / square / ((PLACES - away * SIDE) * SIDE);
+		print_message("%2d pictures away: correlation %.3f\n", away, sum);
+		assert_true(std::fabs(sum) < 0.5);
+		all += std::fabs(sum) / 11;
+	}
+	assert_true(all < 0.2);
 }
 
 int main()
@@ -388,8 +508,13 @@ int main()
 		cmocka_unit_test(waves_run_as_on_deep_water),
 		cmocka_unit_test(waves_are_as_high_as_the_wind_makes_them),
 		cmocka_unit_test(glitter_is_the_same_from_any_distance),
+		cmocka_unit_test(far_sea_has_no_stripes),
+		cmocka_unit_test(glitter_breaks_up_at_its_edges),
 		cmocka_unit_test(ground_noise_is_normalised),
 		cmocka_unit_test(detail_changes_no_mean),
+		cmocka_unit_test(grass_is_smooth_far_away),
+		cmocka_unit_test(home_shows_the_picture_as_it_is),
+		cmocka_unit_test(picture_is_not_seen_to_repeat),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

@@ -379,12 +379,46 @@ static void slopes_share_the_flux_out(void **)
 	}
 }
 
+/* Far from the camera lookups are shifted (field_warp.glsl): smoothly, nowhere folding back, and so that areas stay. Near it they are not,
+ * nor without waves. */
+static void warps_keep_areas(void **)
+{
+	double sum = 0, deepest = 1, steepest = 0, shift = 0;
+	int count = 0;
+	glsl::cloud_warp = vec4(0.3f, 0.8f, 0.1f, 1);
+	for (double y = -12; y < 12; y += 0.05)
+		for (double x = -12; x < 12; x += 0.05) {
+			const double d = 0.01;
+			const vec2 at = glsl::march::field_warp(vec2(x, y));
+			const vec2 dx = glsl::march::field_warp(vec2(x + d, y)) - at, dy = glsl::march::field_warp(vec2(x, y + d)) - at;
+			if (std::hypot(x, y) < 0.48)
+				assert_true(at == vec2(0) && dx == vec2(0) && dy == vec2(0));
+			const double a = (double)dx.x / d, b = (double)dy.x / d, e = (double)dx.y / d, f = (double)dy.y / d;
+			const double area = (1 + a) * (1 + f) - b * e;
+			sum += area;
+			deepest = std::fmin(deepest, area);
+			steepest = std::fmax(steepest, std::sqrt(a * a + b * b + e * e + f * f));
+			shift = std::fmax(shift, (double)glm::length(at));
+			count++;
+		}
+	print_message("areas %.4f in the mean, %.2f at least; slopes up to %.2f; shifts up to %.2f tiles\n", sum / count, deepest, steepest,
+		      shift);
+	assert_true(std::fabs(sum / count - 1) < 0.01);
+	assert_true(deepest > 0.4 && steepest < 0.9 && shift > 0.15);
+	glsl::cloud_warp.w = 0;
+	assert_true(glsl::march::field_warp(vec2(3, 4)) == vec2(0));
+}
+
 int main()
 {
 	const CMUnitTest tests[] = {
-		cmocka_unit_test(rays_meet_what_brute_force_meets), cmocka_unit_test(blocks_start_before_all_their_rays),
-		cmocka_unit_test(grazing_rays_are_finite),          cmocka_unit_test(shadows_are_those_of_brute_force),
-		cmocka_unit_test(a_wall_throws_its_shadow),         cmocka_unit_test(slopes_share_the_flux_out),
+		cmocka_unit_test(warps_keep_areas),
+		cmocka_unit_test(rays_meet_what_brute_force_meets),
+		cmocka_unit_test(blocks_start_before_all_their_rays),
+		cmocka_unit_test(grazing_rays_are_finite),
+		cmocka_unit_test(shadows_are_those_of_brute_force),
+		cmocka_unit_test(a_wall_throws_its_shadow),
+		cmocka_unit_test(slopes_share_the_flux_out),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

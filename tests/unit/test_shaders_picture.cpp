@@ -332,6 +332,8 @@ static void copy_textures(const made &out)
 	glsl::height_puff_layers = copy_of(out.field.puffs ? &out.field.puffs->layers : nullptr);
 	glsl::height_puffs = copy_of_volume(out.field.puffs ? &out.field.puffs->volume : nullptr);
 	glsl::smooth_table = copy_of(out.field.smooth);
+	glsl::side_light = copy_of(out.field.sides);
+	glsl::thickness_packed = copy_of(out.field.thickness_packed);
 	glsl::phase_table = copy_of(&out.drops->phase);
 	glsl::event_table = copy_of(&out.drops->events);
 	glsl::slab_table = copy_of(out.slab_rows);

@@ -136,6 +136,41 @@ static void against_discrete_ordinates(void **state)
 	json_decref(sky);
 }
 
+/* --- round the sun ------------------------------------------------------------------------------------------------------------------ */
+
+/* Light that thin haze adds beside the sun, in its almucantar: scattered once, m tau omega P exp(-m tau) for the air mass m, less what it
+ * takes of the light of the air behind. P by Cornette and Shanks 1992. */
+static void haze_has_its_aureole(void **state)
+{
+	(void)state;
+	enum { ANGLES = 6 };
+	static const double apart[ANGLES] = {0.5, 1, 2, 5, 10, 20};
+	const double depth = 0.01, mass = 2, zenith = 60 * DEGREE, g = 0.7;
+	double aside[ANGLES], view = 60;
+	for (int i = 0; i < ANGLES; i++)
+		aside[i] = 140 + 2 * asin(sin(0.5 * apart[i] * DEGREE) / sin(zenith)) / DEGREE;
+	const struct sky_directions directions = {1, ANGLES, &view, aside};
+	struct sky_light lights[2];
+	for (int hazy = 0; hazy < 2; hazy++) {
+		struct scene scene = small_scene(16, 16, LAYER(SKY));
+		scene.ground.type = GROUND_BLACK;
+		scene.sun.elevation_deg = 30;
+		scene.sun.azimuth_deg = 140;
+		scene.atmosphere = (struct scene_atmosphere){hazy ? depth : 0, 0};
+		assert_int_equal(renderer_sky_light(renderer, &scene, &directions, NULL, NULL, &lights[hazy]), RENDER_OK);
+	}
+	for (int i = 0; i < ANGLES; i++) {
+		const double c = cos(apart[i] * DEGREE), d = 1 + g * g - 2 * g * c;
+		const double phase = 3 / (8 * M_PI) * (1 - g * g) / (2 + g * g) * (1 + c * c) / (d * sqrt(d));
+		const double clean = lights[0].radiance[ANGLES + i], added = lights[1].radiance[ANGLES + i] - clean;
+		const double wanted = 0.8 * phase * mass * depth * exp(-mass * (rayleigh[1] + 0.5 * depth)) - clean * mass * depth * 0.5;
+		print_message("%g degrees from the sun haze adds %.4f, by hand %.4f\n", apart[i], added, wanted);
+		assert_float_equal(added / wanted, 1, 0.06);
+	}
+	for (int hazy = 0; hazy < 2; hazy++)
+		free(lights[hazy].radiance);
+}
+
 /* --- twilight --------------------------------------------------------------------------------------------------------------------------
  */
 
@@ -179,6 +214,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(against_discrete_ordinates),
+		cmocka_unit_test(haze_has_its_aureole),
 		cmocka_unit_test(against_photons),
 		cmocka_unit_test(twilight_is_as_bright_as_measured),
 	};

@@ -1,0 +1,267 @@
+/* The sides of clouds seen from below, compiled for the processor, against brute force: what a slanted view and the sun's beam meet of the
+ * layer, and that light which is spread sideways is neither made nor lost. */
+#include "tests/unit/glsl_shim.h"
+
+#include <cmath>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+extern "C" {
+#include <cmocka.h>
+}
+
+#define uniform static
+namespace glsl
+{
+namespace columns_pass
+{
+#include "shaders/passes/side_columns.glsl"
+} // namespace columns_pass
+#include "tests/unit/glsl_again.h"
+namespace spread_pass
+{
+#include "shaders/passes/side_spread.glsl"
+} // namespace spread_pass
+} // namespace glsl
+
+using glsl::ivec2;
+using glsl::vec2;
+using glsl::vec3;
+using glsl::vec4;
+
+static const double pi = 3.14159265358979, tile = 20000, deepest = 400, kappa = 0.02;
+enum { SIDE = 256 };
+
+/* Deterministic numbers within 0..1. */
+static double random_unit()
+{
+	static uint32_t state = 12345;
+	state = state * 1664525u + 1013904223u;
+	return (double)(state >> 8) / 16777216.0;
+}
+
+/* --- layers ------------------------------------------------------------------------------------------------------------------------- */
+
+static double even(double, double)
+{
+	return 0.6 * deepest;
+}
+
+/* Cells with gaps between them. */
+static double cells(double x, double y)
+{
+	const double bumps =
+		std::sin(2 * pi * 8 * x / tile) * std::sin(2 * pi * 7 * y / tile) + 0.25 * std::sin(2 * pi * (13 * x + 9 * y) / tile);
+	return deepest * std::pow(std::fmin(1, std::fmax(0, bumps)), 0.75);
+}
+
+/* One wall, 2 km thick, from south to north. */
+static double wall(double x, double)
+{
+	return std::fabs(x - 0.5 * tile) < 1000 ? 0.9 * deepest : 0;
+}
+
+/* --- the tables --------------------------------------------------------------------------------------------------------------------- */
+
+static std::shared_ptr<glsl::image> picture(const std::function<vec4(int, int)> &texel)
+{
+	auto image = std::make_shared<glsl::image>();
+	image->repeat_x = image->repeat_y = true;
+	image->levels.push_back({SIDE, SIDE, {}});
+	for (int y = 0; y < SIDE; y++)
+		for (int x = 0; x < SIDE; x++)
+			image->levels[0].texels.push_back(texel(x, y));
+	for (int size = SIDE / 2; size >= 1; size /= 2) {
+		const std::vector<vec4> &below = image->levels.back().texels;
+		std::vector<vec4> texels;
+		for (int y = 0; y < size; y++)
+			for (int x = 0; x < size; x++) {
+				const size_t at = (size_t)(4 * y * size + 2 * x);
+				texels.push_back(0.25f * (below[at] + below[at + 1] + below[at + 2 * (size_t)size] +
+							  below[at + 2 * (size_t)size + 1]));
+			}
+		image->levels.push_back({size, size, texels});
+	}
+	return image;
+}
+
+static glsl::sampler2D run_pass(void (*pass)(ivec2))
+{
+	return picture([&](int x, int y) {
+		pass(ivec2(x, y));
+		return glsl::stored[0];
+	});
+}
+
+/* Level 0 of the packed form. */
+static glsl::sampler2D packed(const glsl::image &of)
+{
+	auto image = std::make_shared<glsl::image>();
+	const auto texel = [&](int x, int y) { return of.levels[0].texels[(size_t)(y % SIDE) * SIDE + (size_t)(x % SIDE)].x; };
+	image->nearest = true;
+	image->levels.push_back({SIDE + SIDE / 2, SIDE, {}});
+	for (int y = 0; y < SIDE; y++)
+		for (int x = 0; x < SIDE + SIDE / 2; x++)
+			image->levels[0].texels.push_back(
+				x < SIDE ? vec4(texel(x, y), texel(x + 1, y), texel(x, y + 1), texel(x + 1, y + 1)) : vec4(0));
+	return image;
+}
+
+static void make(const std::function<double(double, double)> &height, double elevation_deg, double azimuth_deg)
+{
+	const double e = elevation_deg * pi / 180, a = azimuth_deg * pi / 180;
+	glsl::sun_direction = vec4(std::cos(e) * std::sin(a), std::cos(e) * std::cos(a), std::sin(e), 0.0047);
+	glsl::cloud_layer = vec4(1000, deepest, tile, 1);
+	glsl::cloud_drift = vec4(0);
+	glsl::extinction_scaled = vec4((float)kappa);
+	glsl::slab_light = vec4(1, 0, 0.6 * deepest, 0.15 * 2 * kappa);
+	const auto heights =
+		picture([&](int x, int y) { return vec4((float)height((x + 0.5) * tile / SIDE, (y + 0.5) * tile / SIDE), 0, 0, 1); });
+	glsl::thickness_packed = packed(*heights);
+	glsl::columns_pass::thickness = heights;
+	glsl::arguments[0] = vec4(SIDE, 0, 0, 0);
+	const glsl::sampler2D columns = run_pass(glsl::columns_pass::pass);
+	glsl::spread_pass::columns = columns;
+	glsl::arguments[0] = vec4(0.3 * 0.6 * deepest, 0.6 * deepest, 0.4, SIDE);
+	glsl::side_light = run_pass(glsl::spread_pass::pass);
+}
+
+static vec4 light_at(int x, int y)
+{
+	return glsl::side_light->levels[0].texels[(size_t)y * SIDE + (size_t)x];
+}
+
+/* Cloud on a straight way up from the base, m of height. */
+static double passed(const std::function<double(double, double)> &height, double x, double y, double east, double north)
+{
+	const double step = 1;
+	double sum = 0;
+	for (double z = 0.5 * step; z < deepest; z += step)
+		sum += height(x + east * z, y + north * z) > z ? step : 0;
+	return sum;
+}
+
+/* --- tests -------------------------------------------------------------------------------------------------------------------------- */
+
+/* Nothing is changed where there are no sides. */
+static void an_even_layer_is_a_slab(void **)
+{
+	for (double elevation : {80., 30., 6.}) {
+		make(even, elevation, 50);
+		for (double mu : {1., 0.5, 0.13}) {
+			const double found = even(0, 0);
+			const glsl::spread_pass::side_view view =
+				glsl::spread_pass::side_view_at(vec2(1234, 9876), vec2(0.3f, -0.8f), (float)mu);
+			const glsl::spread_pass::side_lit lit = glsl::spread_pass::side_lit_at(view, 1, (float)found, (float)found);
+			assert_float_equal(view.entry, 0, 0.01);
+			assert_float_equal(lit.thickness, found, 0.02);
+			assert_float_equal(lit.sun, found, 0.02);
+			assert_float_equal(lit.smooth_m, found, 0.02);
+			assert_float_equal(lit.light, 1, 1e-3);
+		}
+	}
+}
+
+/* Evening out is a mean: the layer stays as thick as it is. */
+static void spreading_keeps_the_mean(void **)
+{
+	make(cells, 35, 120);
+	double before = 0, after = 0, contrast[2] = {0, 0};
+	for (int y = 0; y < SIDE; y++)
+		for (int x = 0; x < SIDE; x++) {
+			const double h = cells((x + 0.5) * tile / SIDE, (y + 0.5) * tile / SIDE), smooth = light_at(x, y).x;
+			before += h / (SIDE * SIDE);
+			after += smooth / (SIDE * SIDE);
+			contrast[0] += h * h / (SIDE * SIDE);
+			contrast[1] += smooth * smooth / (SIDE * SIDE);
+		}
+	print_message("mean thickness %.2f m, evened out %.2f m; its variance %.0f and %.0f m2\n", before, after,
+		      contrast[0] - before * before, contrast[1] - after * after);
+	assert_true(std::fabs(after / before - 1) < 1e-3);
+	assert_true(contrast[1] - after * after < 0.95 * (contrast[0] - before * before));
+}
+
+/* The beam's way to the base, and its mean: slanted columns share the layer out as upright ones do. */
+static void beams_pass_what_brute_force_passes(void **)
+{
+	for (double elevation : {65., 35., 15.}) {
+		const double azimuth = 120, slope = 1 / std::tan(elevation * pi / 180);
+		make(cells, elevation, azimuth);
+		double squares = 0, mean = 0, upright = 0;
+		const int count = 2000;
+		for (int i = 0; i < count; i++) {
+			const int px = (int)(SIDE * random_unit()), py = (int)(SIDE * random_unit());
+			const double truth = passed(cells, (px + 0.5) * tile / SIDE, (py + 0.5) * tile / SIDE,
+						    slope * std::sin(azimuth * pi / 180), slope * std::cos(azimuth * pi / 180));
+			squares += std::pow((double)light_at(px, py).w - truth, 2) / count;
+		}
+		for (int y = 0; y < SIDE; y++)
+			for (int x = 0; x < SIDE; x++) {
+				mean += (double)light_at(x, y).w / (SIDE * SIDE);
+				upright += cells((x + 0.5) * tile / SIDE, (y + 0.5) * tile / SIDE) / (SIDE * SIDE);
+			}
+		print_message("sun at %.0f deg: thickness on the beam against brute force, rms %.1f m; mean %.2f m, upright %.2f m\n",
+			      elevation, std::sqrt(squares), mean, upright);
+		assert_true(std::sqrt(squares) < 0.06 * deepest);
+		assert_true(std::fabs(mean / upright - 1) < 0.01);
+	}
+}
+
+/* The same for views, which look at four heights alone. */
+static void views_meet_what_brute_force_meets(void **)
+{
+	make(cells, 35, 120);
+	for (double mu : {0.9, 0.6, 0.35}) {
+		const double slope = std::sqrt(1 - mu * mu) / mu;
+		double squares = 0, flat = 0, mean = 0, wanted = 0;
+		const int count = 4000;
+		for (int i = 0; i < count; i++) {
+			const double x = tile * random_unit(), y = tile * random_unit(), a = 2 * pi * random_unit();
+			const double truth = passed(cells, x, y, slope * std::sin(a), slope * std::cos(a));
+			const glsl::spread_pass::side_view view = glsl::spread_pass::side_view_at(
+				vec2((float)x, (float)y), vec2((float)std::sin(a), (float)std::cos(a)), (float)mu);
+			squares += std::pow(view.thickness - truth, 2) / count;
+			flat += std::pow(cells(x, y) - truth, 2) / count;
+			mean += view.thickness / count;
+			wanted += truth / count;
+		}
+		print_message(
+			"cosine %.2f: thickness on the view, rms %.1f m, of the place at the base alone %.1f m; mean %.1f of %.1f m\n", mu,
+			std::sqrt(squares), std::sqrt(flat), mean, wanted);
+		assert_true(std::sqrt(squares) < 0.6 * std::sqrt(flat) + 8);
+		assert_true(std::fabs(mean / wanted - 1) < 0.06);
+	}
+}
+
+/* Of a wall the side towards the sun is bright, the one away from it dark, and a little within still more than far inside. */
+static void a_wall_has_a_bright_side(void **)
+{
+	for (double azimuth : {90., 270.}) {
+		make(wall, 30, azimuth);
+		const int towards = azimuth == 90. ? 1 : -1;
+		const auto at = [&](double from_middle) {
+			return light_at(SIDE / 2 + (int)std::floor(towards * from_middle * SIDE / tile), 100);
+		};
+		print_message("sun in azimuth %.0f: light of the wall's base %.2f at the lit side, %.2f inside, %.2f at the other; of its "
+			      "sides %.2f and %.2f\n",
+			      azimuth, (double)at(850).y, (double)at(0).y, (double)at(-850).y, (double)at(950).z, (double)at(-950).z);
+		assert_true(at(850).y > 1.2 * at(0).y);
+		assert_true(at(-850).y < 1.1 * at(0).y);
+		assert_true(at(950).z > 1.1 * at(-950).z);
+		assert_float_equal(at(0).y, glsl::spread_pass::side_transmitted(0.9f * (float)deepest), 0.05);
+	}
+}
+
+int main()
+{
+	const CMUnitTest tests[] = {
+		cmocka_unit_test(an_even_layer_is_a_slab),
+		cmocka_unit_test(spreading_keeps_the_mean),
+		cmocka_unit_test(beams_pass_what_brute_force_passes),
+		cmocka_unit_test(views_meet_what_brute_force_meets),
+		cmocka_unit_test(a_wall_has_a_bright_side),
+	};
+	return cmocka_run_group_tests(tests, nullptr, nullptr);
+}

@@ -19,6 +19,8 @@ const float SIDE_SIZE = HEIGHT_SIZE_SMOOTH;
 // Heights at which a slanted view looks for cloud, of that of the layer; in between tops are straight.
 const int SIDE_SLICES = 4;
 const vec4 SIDE_HEIGHTS = vec4(0.0, 0.12, 0.34, 0.72);
+// Octaves by which texels of the tops are smaller than the way through the layer, at the upper slices: about half of what lies between two of them. Larger texels lose the tops.
+const float SIDE_SHARP = 2.5;
 // Where there is no cloud the top is as far below the base, m.
 const float SIDE_NONE = 12.0;
 // Of several places that are seen at once, deviation of their heights above which detail of none is told, m.
@@ -66,8 +68,11 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v)
 	vec2 uv = field_place(place) / cloud_layer.z;
 	vec2 stride = ahead * (cloud_layer.y / cloud_layer.z);
 	vec4 tops;
-	for (int i = 0; i < SIDE_SLICES; i++)
-		tops[i] = packed_linear(thickness_packed, uv + stride * SIDE_HEIGHTS[i], int(SIDE_SIZE), 0.0);
+	tops[0] = packed_linear(thickness_packed, uv, int(SIDE_SIZE), 0.0);
+	// What lies between slices of a slanted view is not looked at; it would leave hooks and bars.
+	float level = log2(max(length(stride) * SIDE_SIZE, 1e-3)) - SIDE_SHARP;
+	for (int i = 1; i < SIDE_SLICES; i++)
+		tops[i] = packed_linear_between(thickness_packed, uv + stride * SIDE_HEIGHTS[i], int(SIDE_SIZE), level - (i == 1 ? 1.0 : 0.0));
 	vec4 bottoms = cloud_layer.y * SIDE_HEIGHTS;
 	vec4 ends = vec4(bottoms.y, bottoms.z, bottoms.w, cloud_layer.y);
 	// How far inside the view is where a slice begins and ends; a top of 0 is none.

@@ -95,17 +95,20 @@ static glsl::sampler2D run_pass(void (*pass)(ivec2))
 	});
 }
 
-/* Level 0 of the packed form. */
+/* The packed form (shaders/lib/packed.glsl). */
 static glsl::sampler2D packed(const glsl::image &of)
 {
 	auto image = std::make_shared<glsl::image>();
-	const auto texel = [&](int x, int y) { return of.levels[0].texels[(size_t)(y % SIDE) * SIDE + (size_t)(x % SIDE)].x; };
 	image->nearest = true;
-	image->levels.push_back({SIDE + SIDE / 2, SIDE, {}});
-	for (int y = 0; y < SIDE; y++)
-		for (int x = 0; x < SIDE + SIDE / 2; x++)
-			image->levels[0].texels.push_back(
-				x < SIDE ? vec4(texel(x, y), texel(x + 1, y), texel(x, y + 1), texel(x + 1, y + 1)) : vec4(0));
+	image->levels.push_back({SIDE + SIDE / 2, SIDE, std::vector<vec4>((size_t)(SIDE + SIDE / 2) * SIDE, vec4(0))});
+	for (size_t level = 0; level < of.levels.size(); level++) {
+		const int size = SIDE >> level, left = level ? SIDE : 0, top = level ? SIDE - 2 * size : 0;
+		const auto texel = [&](int x, int y) { return of.levels[level].texels[(size_t)(y % size * size + x % size)].x; };
+		for (int y = 0; y < size; y++)
+			for (int x = 0; x < size; x++)
+				image->levels[0].texels[(size_t)((top + y) * (SIDE + SIDE / 2) + left + x)] =
+					vec4(texel(x, y), texel(x + 1, y), texel(x, y + 1), texel(x + 1, y + 1));
+	}
 	return image;
 }
 

@@ -561,6 +561,8 @@ def test_load(start_daemon):
     daemon = start_daemon()
     running = start_long(daemon)
     assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2)
+    time.sleep(0.5)
+    assert wait_for(lambda: daemon.metric("stratus_tracings_waiting") == 0)  # the thread that traces stands behind all others
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
         waiting = [pool.submit(daemon.get, target(seed=i, **LONG), X_Timeout_Ms="10000") for i in range(4)]
         assert wait_for(lambda: daemon.metric("stratus_tracings_waiting") == 4)

@@ -259,7 +259,7 @@ vec3 reference_sea_beam(reference_sea sea, vec3 up, vec3 to_light)
 {
 	float mu = dot(up, to_light);
 	vec3 here = normalize(vec3(to_light.x, to_light.y, 0.0) + vec3(0.0, 0.0, mu));
-	return mu > 1e-3 ? vec3(ground_patch.y * sea_glint(sea.slopes, sea.to_viewer, here, sea.area)) + sea.leaving * mu : vec3(0.0);
+	return mu > 1e-3 ? vec3(ground_patch.y * sea_glint(sea.slopes, sea.to_viewer, here)) + sea.leaving * mu : vec3(0.0);
 }
 
 // A direction to go on in; the path's share changes by what comes from there.

@@ -185,6 +185,28 @@ static void clear_skies_have_no_error(void **state)
 	frame_finish(&slab);
 }
 
+/* Each kind has a program of its own in the reference. */
+static void grounds_are_those_of_the_slab(void **state)
+{
+	(void)state;
+	for (int ground = 0; ground <= GROUND_SNOW; ground++) {
+		struct scene scene = reference_scene(64, LAYER(COLOR));
+		scene.clouds.type = CLOUD_STRATUS;
+		scene.clouds.coverage = 1;
+		scene.ground.type = (enum ground_type)ground;
+		scene.camera.position_m[2] = 300;
+		scene.camera.elevation_deg = -35;
+		struct frame traced = render(&scene);
+		scene.model.name = MODEL_SLAB;
+		struct frame solved = render(&scene);
+		const double ratio = mean_luminance(&traced, LAYER_COLOR) / mean_luminance(&solved, LAYER_COLOR);
+		print_message("ground %d: %.3f\n", ground, ratio);
+		assert_true(ratio > 0.85 && ratio < 1.15);
+		frame_finish(&traced);
+		frame_finish(&solved);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -194,6 +216,7 @@ int main(void)
 		cmocka_unit_test(disc_is_that_of_the_slab),
 		cmocka_unit_test(cancelling_leaves_what_there_is),
 		cmocka_unit_test(time_ends_the_paths),
+		cmocka_unit_test(grounds_are_those_of_the_slab),
 		cmocka_unit_test(clear_skies_have_no_error),
 	};
 	return RUN_WITH_RENDERER(tests);

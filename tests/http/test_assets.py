@@ -311,7 +311,7 @@ def test_broken_uploads_leave_nothing(start_daemon, picture):
         client.close()
         assert wait_for(lambda: not any(incoming.iterdir()))
     assert daemon.get("/v1/assets").json["assets"] == []
-    assert daemon.metric("stratus_requests_in_flight") == 1
+    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 1)
 
 
 # --- scenes -----------------------------------------------------------------------------------------------------------------------

@@ -130,9 +130,10 @@ def test_lines_are_cut_and_not_forged(start_daemon):
     daemon.get("/a%0a2026-01-01T00:00:00.000Z%20info%20forged", X_Request_Id="evil\tid=1")
     found = wait_for_requests(daemon, "text", 2)
     assert len(found) == 2
-    assert found[0]["path"] == "/" + "x" * 199
-    assert found[1]["path"].startswith("/a%0a2026")
-    assert re.fullmatch(r"[0-9a-f]{32}", found[1]["id"])
+    forged, cut = sorted(found, key=lambda record: len(record["path"]))  # of two threads either may write first
+    assert cut["path"] == "/" + "x" * 199
+    assert forged["path"].startswith("/a%0a2026")
+    assert re.fullmatch(r"[0-9a-f]{32}", forged["id"])
 
 
 def test_probes_are_quiet(start_daemon):

@@ -72,6 +72,7 @@ static void an_even_deck_has_an_even_aureole(void **state)
 		print_message("sun at %g, share %g: %.3g at the disc, %.3g at 1 degree, %.3g at 5\n", elevations[i / 2], thicknesses[i % 2],
 			      sum[1] / count[1], sum[4] / count[4], sum[20] / count[20]);
 		frame_finish(&frame);
+		scene_map_release(map);
 	}
 }
 

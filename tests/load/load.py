@@ -7,6 +7,7 @@ answered within the time that a full queue takes, the rest must be told so at on
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -23,6 +24,7 @@ GOODPUT_LOSS = 0.10
 def bench(build, name, *options):
     kept = KEPT / f"{name}.json"
     command = [build + "/stratus", "bench", "--mix", MIX, "--duration", SECONDS, "--warm-up", "5", "--json", kept, "-q", *options]
+    command += ["--seed", str(len(list(KEPT.glob("*.json"))) + 1)]  # no scene twice: what is kept would be found
     subprocess.run(command, check=False)  # at an overload no good answer at all is a result, too
     return json.loads(kept.read_text())
 
@@ -45,7 +47,8 @@ def check(broken, holds, text):
 
 def main():
     build, queue = sys.argv[1], int(sys.argv[2])
-    KEPT.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(KEPT, ignore_errors=True)
+    KEPT.mkdir(parents=True)
     print(f"{'offered':>8} {'asked/s':>9} {'good/s':>9} {'p50 ms':>8} {'p99 ms':>8} {'refused':>9} {'p50 ms':>8} {'p99 ms':>8} {'errors':>7}")
     closed = bench(build, "closed", "--connections", str(CLIENTS))
     row("closed", closed)

@@ -32,7 +32,7 @@ struct connection {
 	enum connection_state state;
 	int fd;
 	struct mix_request request; /* kept until connection_finish_request */
-	int64_t planned_ns, sent_ns;
+	int64_t planned_ns;
 	bool measured; /* the load's own mark: counts in its result */
 
 	size_t sent;

@@ -52,17 +52,6 @@ void histogram_record(struct histogram *histogram, int64_t ns)
 		histogram->largest = value;
 }
 
-void histogram_add(struct histogram *to, const struct histogram *from)
-{
-	for (int i = 0; i < BUCKETS; i++)
-		to->count[i] += from->count[i];
-	to->total += from->total;
-	to->sum += from->sum;
-	to->sum_of_squares += from->sum_of_squares;
-	if (from->largest > to->largest)
-		to->largest = from->largest;
-}
-
 uint64_t histogram_count(const struct histogram *histogram)
 {
 	return histogram->total;

@@ -15,7 +15,6 @@ void histogram_destroy(struct histogram *histogram);
 
 /* ns: from 0; beyond 70 minutes it counts as that. */
 void histogram_record(struct histogram *histogram, int64_t ns);
-void histogram_add(struct histogram *to, const struct histogram *from);
 
 uint64_t histogram_count(const struct histogram *histogram);
 

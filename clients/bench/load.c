@@ -153,7 +153,6 @@ static enum connection_event begin(struct load *load, int index, struct mix_requ
 	struct connection *connection = &load->connection[index];
 	const bool fresh = connection->state == CONNECTION_CLOSED;
 	enum connection_event event = connection_start(connection, load->address.found, request);
-	connection->sent_ns = now_ns();
 	if (event == CONNECTION_GOES_ON && fresh) {
 		struct epoll_event interest = {.events = EPOLLIN | EPOLLOUT | EPOLLRDHUP | EPOLLET, .data.u32 = (uint32_t)index};
 		if (epoll_ctl(load->epoll, EPOLL_CTL_ADD, connection->fd, &interest) != 0) {

@@ -100,12 +100,13 @@ static void close_slow(struct connections *connections)
 		const bool reads = connection->phase == PHASE_READING, waits = connection->phase == PHASE_IDLE && connection->is_surplus;
 		if (!(reads || waits) || now_ms < connection->limit_ms)
 			continue;
+		/* First of all: as soon as the socket is shut libmicrohttpd's thread ends the request and asks why. */
+		connection->is_slow = true;
+		connection->phase = PHASE_WORKING;
+		connections->counts.slow++;
 		if (reads)
 			refuse_slowness(connection);
 		shutdown(connection->fd, SHUT_RDWR);
-		connection->phase = PHASE_WORKING;
-		connection->is_slow = true;
-		connections->counts.slow++;
 	}
 }
 

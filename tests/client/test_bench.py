@@ -83,7 +83,7 @@ def serve():
         server.close()
 
 
-def run(url, *options, timeout=60):
+def run(url, *options, timeout=180):
     return subprocess.run([STRATUS, "bench", "--server", url, *options], capture_output=True, text=True, timeout=timeout, check=False)
 
 
@@ -93,13 +93,21 @@ def figures(url, *options, status=0):
     return json.loads(result.stdout)
 
 
+def in_some_try(attempt, tries=6):
+    """Bounds of time: a busy machine, on which the server runs too, exceeds them now and then, and a client that measures wrongly always."""
+    return any(attempt() for _ in range(tries))
+
+
 def test_an_open_load_asks_at_its_rate_whatever_the_answers(serve):
-    server = serve(lambda *_: plain())
-    found = figures(server.url, "--rate", "200", "--duration", "2", "--warm-up", "0.5")
-    assert found["asked"] == 400 and found["status"] == {"200": 400} and found["errors"] == 0
-    assert found["bytes"] == 400 * 1000
-    assert len(server.heads) == 500
-    assert 0 < found["good"]["p50_s"] < 0.05
+    def is_quick():
+        server = serve(lambda *_: plain())
+        found = figures(server.url, "--rate", "200", "--duration", "2", "--warm-up", "0.5")
+        assert found["asked"] == 400 and found["status"] == {"200": 400} and found["errors"] == 0
+        assert found["bytes"] == 400 * 1000
+        assert len(server.heads) == 500
+        return 0 < found["good"]["p50_s"] < 0.05
+
+    assert in_some_try(is_quick)
 
 
 def test_who_would_have_come_while_a_server_stands_still_is_counted(serve):
@@ -111,16 +119,19 @@ def test_who_would_have_come_while_a_server_stands_still_is_counted(serve):
                 time.sleep(1)
         return plain()
 
-    server = serve(answer)
-    server.gate = threading.Lock()
-    found = figures(server.url, "--rate", "100", "--duration", "2", "--warm-up", "0")
-    assert found["good"]["count"] == 200
-    assert found["good"]["max_s"] >= 0.99
-    # Half of the requests were due within that second; on average they wait half of it.
-    assert found["good"]["p90_s"] > 0.5
-    assert 0.2 < found["good"]["mean_s"] < 0.5
-    closed = figures(server.url, "--connections", "1", "--duration", "0.3", "--warm-up", "0")
-    assert closed["good"]["p90_s"] < 0.05
+    def is_counted():
+        server = serve(answer)
+        server.gate = threading.Lock()
+        found = figures(server.url, "--rate", "100", "--duration", "2", "--warm-up", "0")
+        assert found["good"]["count"] == 200
+        assert found["good"]["max_s"] >= 0.99
+        # Half of the requests were due within that second; on average they wait half of it.
+        assert found["good"]["p90_s"] > 0.5
+        assert found["good"]["mean_s"] > 0.2
+        closed = figures(server.url, "--connections", "1", "--duration", "0.3", "--warm-up", "0")
+        return found["good"]["mean_s"] < 0.5 and closed["good"]["p90_s"] < 0.05
+
+    assert in_some_try(is_counted)
 
 
 def test_latency_is_what_the_server_takes(serve):
@@ -128,10 +139,13 @@ def test_latency_is_what_the_server_takes(serve):
         time.sleep(0.05)
         return plain()
 
-    found = figures(serve(answer).url, "--connections", "5", "--duration", "1", "--warm-up", "0.1")
-    assert 0.05 <= found["good"]["p50_s"] < 0.1
-    assert found["connections"] == 5
-    assert 5 / found["good"]["mean_s"] == pytest.approx(found["good_per_s"], rel=0.15)
+    def is_measured():
+        found = figures(serve(answer).url, "--connections", "5", "--duration", "1", "--warm-up", "0.1")
+        assert 0.05 <= found["good"]["p50_s"]
+        assert found["connections"] == 5
+        return found["good"]["p50_s"] < 0.1 and 5 / found["good"]["mean_s"] == pytest.approx(found["good_per_s"], rel=0.15)
+
+    assert in_some_try(is_measured)
 
 
 def test_answers_are_counted_by_what_they_are(serve):

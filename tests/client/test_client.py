@@ -95,7 +95,7 @@ def server():
 def stratus(server, *arguments, **keywords):
     url = f"http://127.0.0.1:{server.server_port}" if server else "http://127.0.0.1:9"
     environment = {**os.environ, "STRATUS_SERVER": url}
-    return subprocess.run([BUILD / "stratus", *map(str, arguments)], env=environment, capture_output=True, timeout=60, **keywords)
+    return subprocess.run([BUILD / "stratus", *map(str, arguments)], env=environment, capture_output=True, timeout=180, **keywords)
 
 
 def test_empty_scene(server, tmp_path):

@@ -10,6 +10,7 @@
  *   gl-memory      OpenGL has no memory for the next texture
  *   host-memory    BYTES: the next allocation of at least so many fails
  *   hang           S: the next pass holds the thread up for so many seconds
+ *   hold           as long as the link exists: the next pass waits, and a link `held` says that it does
  *   growth         MB: the context takes so much memory, until it is destroyed
  *   gone           as long as the link exists: no context comes up
  *   black          as long as the link exists: nothing is drawn
@@ -100,9 +101,23 @@ static GLenum EPOXY_CALLSPEC faulty_glGetError(void)
 	return injected ? GL_OUT_OF_MEMORY : error;
 }
 
+static void wait_while_held(void)
+{
+	double number;
+	char held[PATH_MAX];
+	bool said = false;
+	if (!folder || snprintf(held, sizeof held, "%s/held", folder) >= (int)sizeof held)
+		return;
+	for (; find("hold", &number, false); nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL))
+		said = said || symlink("1", held) == 0;
+	if (said)
+		unlink(held);
+}
+
 static void EPOXY_CALLSPEC faulty_glUseProgram(GLuint program)
 {
 	double number;
+	wait_while_held();
 	if (find("hang", &number, true))
 		nanosleep(&(struct timespec){.tv_sec = (time_t)number}, NULL);
 	RESTORE(glUseProgram);

@@ -23,7 +23,7 @@ SUN = "/v1/sun?time=2024-06-21T12:00:00Z&latitude_deg=48&longitude_deg=11"
 
 def new_key(name):
     """(the key, the line for the file)"""
-    made = subprocess.run([BUILD / "stratusd", "--new-key", name], capture_output=True, text=True, timeout=60)
+    made = subprocess.run([BUILD / "stratusd", "--new-key", name], capture_output=True, text=True, timeout=180)
     assert made.returncode == 0
     key, line = made.stdout.splitlines()
     assert key not in line and line.startswith(f"{name} sha256:")
@@ -58,7 +58,7 @@ class Keys:
 
 NAMED, OTHER = "https://sky.example", "http://localhost:3000"
 LIMITS = {"alice": "", "bob": "", "slow": "requests_per_minute=3", "steady": "requests_per_minute=60", "layers": "megapixels_per_minute=1",
-          "tiny": "megapixels_per_minute=0.001"}  # 1000 pixels: one picture of 32 x 24 and not two
+          "tiny": "megapixels_per_minute=0.0001"}  # 100 pixels: a picture of 32 x 24 is owed for minutes
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,6 @@ def reload(daemon):
         return len(parts) > seen + 1 and re.search(r"keys: [0-9]+ from|of before stay in force|tls: ", parts[-1])
 
     assert wait_for(done)
-    time.sleep(0.05)  # the certificate comes behind the keys
 
 
 # --- keys --------------------------------------------------------------------------------------------------------------------------
@@ -170,7 +169,7 @@ def test_log_and_metrics_know_the_name(guarded, keys):
     alice, bob = keys.keys["alice"], keys.keys["bob"]
 
     def lines():
-        found = [json.loads(line) for line in guarded.log.read_text().splitlines()]
+        found = [json.loads(line) for line in guarded.lines]
         return [r for r in found if r.get("event") == "request" and r["id"].startswith("named-")]
 
     before = metric_of(guarded, keys, 'stratus_key_requests_total{key="bob"}')
@@ -178,7 +177,8 @@ def test_log_and_metrics_know_the_name(guarded, keys):
     assert guarded.get(SUN, X_Request_Id="named-1", **bearer(bob)).status == 200
     assert guarded.get(SUN, X_Request_Id="named-2", **bearer(new_key("carol")[0])).status == 401
     assert wait_for(lambda: len(lines()) == 3)
-    assert [line.get("key") for line in lines()] == ["alice", "bob", None]
+    # An answer is logged after it is sent, each by the thread of its connection: in any order.
+    assert {line["id"]: line.get("key") for line in lines()} == {"named-0": "alice", "named-1": "bob", "named-2": None}
     assert metric_of(guarded, keys, 'stratus_key_requests_total{key="bob"}') == before + 1
     assert metric_of(guarded, keys, 'stratus_key_pixels_total{key="alice"}') >= 32 * 24
     assert metric_of(guarded, keys, 'stratus_key_pixels_total{key="bob"}') == 0
@@ -238,8 +238,21 @@ def test_reload_without_keys_is_nothing(daemon):
 
 def test_requests_a_minute(guarded, keys):
     slow, bob = keys.keys["slow"], keys.keys["bob"]
-    assert [guarded.get(SUN, **bearer(slow)).status for _ in range(3)] == [200] * 3
-    refused = guarded.get(SUN, **bearer(slow))
+    begin = time.monotonic()
+
+    def ask_until_refused():
+        """How many were served before."""
+        for served in range(1000):
+            answer = guarded.get(SUN, **bearer(slow))
+            if answer.status != 200:
+                return served, answer
+
+    def regained():
+        """Of a request each third of a minute, by now."""
+        return int((time.monotonic() - begin) / 20)
+
+    served, refused = ask_until_refused()
+    assert 3 <= served <= 3 + regained()
     assert_problem(refused, 429, "allowance-used-up")
     assert 1 <= int(refused.headers["Retry-After"]) <= 20 == 60 / 3
     assert refused.json["retry_after_seconds"] == int(refused.headers["Retry-After"])
@@ -249,7 +262,8 @@ def test_requests_a_minute(guarded, keys):
     assert metric_of(guarded, keys, 'stratus_key_refused_total{key="slow",limit="requests"}') == 1
     # Reading the file again gives nothing back.
     reload(guarded)
-    assert guarded.get(SUN, **bearer(slow)).status == 429
+    more, refused = ask_until_refused()
+    assert refused.status == 429 and served + more <= 3 + regained()
 
 
 def test_after_the_time_it_says_it_goes_on(guarded, keys):
@@ -273,12 +287,13 @@ def test_after_the_time_it_says_it_goes_on(guarded, keys):
 
 
 def test_megapixels_a_minute(guarded, keys):
-    tiny = keys.keys["tiny"]
+    tiny, begin = keys.keys["tiny"], time.monotonic()
     first = guarded.render({**SMALL, "sun": {"elevation_deg": 61.7}}, **bearer(tiny))  # nobody has had it rendered before
     assert first.status == 200
     refused = guarded.render({**SMALL, "sun": {"elevation_deg": 20}}, **bearer(tiny))
     assert_problem(refused, 429, "allowance-used-up")
-    assert 20 <= int(refused.headers["Retry-After"]) <= 33  # 768 - 232 pixels at 1000 a minute
+    # 768 pixels at 100 a minute, until as many may be taken as fit into a minute; less what has passed since.
+    assert 7.68 * 60 - (time.monotonic() - begin) - 1 <= int(refused.headers["Retry-After"]) <= 7.68 * 60 + 1
     # What is not rendered costs none: headers, pictures that the client has, other calls.
     location = first.headers["Content-Location"]
     assert guarded.head(location, **bearer(tiny)).status == 200
@@ -347,7 +362,7 @@ def test_names_of_new_keys():
     for name in ("", "a b", "a/b", "x" * 33, "anonymous"):
         made = subprocess.run([BUILD / "stratusd", "--new-key", name], capture_output=True, text=True, timeout=60)
         assert made.returncode == 2 and made.stdout == ""
-    assert subprocess.run([BUILD / "stratusd", "--new-key"], capture_output=True, timeout=60).returncode == 2
+    assert subprocess.run([BUILD / "stratusd", "--new-key"], capture_output=True, timeout=180).returncode == 2
 
 
 # --- TLS ---------------------------------------------------------------------------------------------------------------------------
@@ -442,18 +457,13 @@ def test_what_is_no_tls(secure):
 
 def test_client_that_leaves_is_noticed_over_tls(secure):
     """A render that nobody waits for any more is dropped, as without TLS."""
-    scene = {"output": {"width": 2048, "height": 1536}, "model": {"name": "reference", "samples": 64}}
+    scene = {"output": {"width": 320, "height": 240}, "model": {"name": "reference", "samples": 2048}}
     connection = secure.connect()
     connection.request("POST", "/v1/render", json.dumps(scene), {"Content-Type": "application/json", **secure.shown})
     assert wait_for(lambda: secure.metric("stratus_requests_in_flight") > 1)
     connection.sock.close()
     connection.close()
-    assert wait_for(lambda: secure.metric('stratus_renders_ended_total{reason="abandoned"}') == 1, 120)
-
-
-def serial_shown(daemon):
-    with ssl._create_unverified_context().wrap_socket(socket.create_connection(("127.0.0.1", daemon.port), timeout=60)) as client:
-        return client.getpeercert(True)
+    assert wait_for(lambda: secure.metric('stratus_renders_ended_total{reason="abandoned"}') == 1)
 
 
 def stratus(daemon, *arguments, **environment):
@@ -495,12 +505,12 @@ def test_certificate_is_read_again(secure, certificate, tmp_path):
     other_cert, other_key = make_certificate(tmp_path, "other")
     # A certificate without its key is not taken.
     shutil.copy(other_cert, cert)
-    reload(secure)
+    reload(secure)  # the certificate comes behind the keys
+    assert wait_for(lambda: "the certificate of before stay in force" in secure.log.read_text())
     assert certificate_shown(secure) == before
-    assert "the certificate of before stay in force" in secure.log.read_text()
     shutil.copy(other_key, key)
     reload(secure)
-    assert certificate_shown(secure) == ssl.PEM_cert_to_DER_cert(open(other_cert).read()) != before
+    assert wait_for(lambda: certificate_shown(secure) == ssl.PEM_cert_to_DER_cert(open(other_cert).read()) != before)
     standing.request("GET", "/healthz")
     assert standing.getresponse().status == 200
     standing.close()

@@ -1,6 +1,7 @@
 """Uploaded maps: the calls, the scenes that name them, files of strangers, and everything at once."""
 import concurrent.futures
 import http.client
+import itertools
 import json
 import os
 import random
@@ -16,7 +17,7 @@ import numpy
 import OpenImageIO as oiio
 import pytest
 
-from conftest import SANITIZED, Daemon, wait_for
+from conftest import SANITIZED, Daemon, in_some_try, wait_for
 from test_service import assert_problem
 
 SMALL = {"width": 32, "height": 24}
@@ -193,9 +194,14 @@ def test_texts_are_not_unpacked(daemon, put):
     """A compressed text that would be a gigabyte, and large ones that are none."""
     bomb = zlib.compress(bytes(200 << 20), 9)
     before = chunk(b"zTXt", b"key\0\0" + bomb) + chunk(b"iTXt", b"key\0\1\0\0\0" + bomb) + chunk(b"iTXt", b"key\0\0\0\0\0" + bytes(8 << 20))
-    began = time.monotonic()
-    assert put("texts", png_by_hand(1, 1, b"\0\x33", before)).status == 201
-    assert time.monotonic() - began < (30 if SANITIZED else 5)
+    data = png_by_hand(1, 1, b"\0\x33", before)
+
+    def is_quick():
+        began = time.monotonic()
+        assert put("texts", data).status in (201, 204)
+        return time.monotonic() - began < (30 if SANITIZED else 5)
+
+    assert in_some_try(is_quick)
     assert facts_of(daemon, "texts")["thickness"] == pytest.approx([0.2, 0.2], abs=1e-6)
 
 
@@ -295,7 +301,7 @@ def test_body_of_unknown_length(daemon, put, picture):
 
 def test_expectation_is_answered_before_the_body(daemon):
     """What is wrong in the headers is said before a client that waits for it has sent a byte."""
-    with socket.create_connection(("127.0.0.1", daemon.port), timeout=60) as client:
+    with socket.create_connection(("127.0.0.1", daemon.port), timeout=180) as client:
         client.sendall(b"PUT /v1/assets/big HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999\r\nExpect: 100-continue\r\n\r\n")
         assert client.recv(4096).startswith(b"HTTP/1.1 413 ")
 
@@ -550,12 +556,15 @@ def test_everything_at_once(start_daemon, picture, read_image):
     }
     daemon.request("PUT", "/v1/assets/busy", versions[0])
     extinction = daemon.get("/v1/optics").json["extinction_per_m"][1]
-    until = time.monotonic() + (8 if SANITIZED else 4)
-    seen = set()
+    begin, seen = time.monotonic(), set()
+
+    def goes_on():
+        """For some seconds, and until two of the contents were rendered."""
+        return time.monotonic() < begin + (4 if len(seen) >= 2 else 180)
 
     def change(number):
         source = random.Random(number)
-        while time.monotonic() < until:
+        while goes_on():
             if source.random() < 0.2:
                 assert daemon.request("DELETE", "/v1/assets/busy").status in (204, 404)
             else:
@@ -563,7 +572,7 @@ def test_everything_at_once(start_daemon, picture, read_image):
 
     def render(number):
         source = random.Random(number)
-        while time.monotonic() < until:
+        while goes_on():
             answer = daemon.render({**scene, "camera": {"elevation_deg": 90, "azimuth_deg": source.randrange(360)}})
             if answer.status == 422:
                 assert answer.pointers == {"/clouds/map"}
@@ -597,14 +606,17 @@ def test_everything_at_once(start_daemon, picture, read_image):
 def test_deleting_one_in_use(start_daemon, picture):
     """Renders that wait for their map to be decoded finish, although it was deleted meanwhile."""
     daemon = start_daemon()
-    data = picture(noise(2000))
-    assert daemon.request("PUT", "/v1/assets/used", data).status == 201
     scenes = [{"clouds": {"map": "used", "resolution": r}, "output": SMALL} for r in (64, 128, 256, 512, 1024)]
-    with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
-        running = [pool.submit(daemon.render, scene) for scene in scenes]
-        assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") > 1)
-        time.sleep(0.05)
-        assert daemon.request("DELETE", "/v1/assets/used").status == 204
-        statuses = [job.result().status for job in running]
-    assert set(statuses) <= {200, 422} and 200 in statuses
-    assert os.path.exists(daemon.log)
+    seeds = itertools.count()
+
+    def one_is_overtaken():
+        assert daemon.request("PUT", "/v1/assets/used", picture(noise(2000, next(seeds)))).status == 201
+        with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
+            running = [pool.submit(daemon.render, scene) for scene in scenes]
+            assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") > 1 or all(job.done() for job in running))
+            assert daemon.request("DELETE", "/v1/assets/used").status == 204
+            late = [job for job in running if not job.done()]
+            assert {job.result().status for job in running} <= {200, 422}
+        return any(job.result().status == 200 for job in late)
+
+    assert in_some_try(one_is_overtaken, 20)

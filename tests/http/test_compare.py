@@ -1,4 +1,5 @@
 """/v1/compare: what it answers, held against the pictures themselves and against FLIP written down a second time."""
+import itertools
 import json
 import math
 import subprocess
@@ -7,7 +8,7 @@ import time
 import numpy
 import pytest
 
-from conftest import BUILD, wait_for
+from conftest import BUILD, in_some_try, wait_for
 
 SMALL = {"output": {"width": 96, "height": 64, "exr_type": "float"}}
 PAPER = [{}, {"model": {"shading": "paper"}}]
@@ -301,7 +302,7 @@ def test_black_ground_at_night_has_no_figures(daemon):
     ({"scene": {"clouds": {"map": "nothing"}}, "variants": PAPER}, {"/scene/clouds/map"}),
 ])
 def test_refusals_name_their_place(daemon, body, pointers):
-    before = daemon.metric('stratus_stage_duration_seconds_count{stage="view"}')
+    before = daemon.settled('stratus_stage_duration_seconds_count{stage="view"}')
     answer = compare(daemon, body)
     assert answer.status == 422 and answer.headers["Content-Type"] == "application/problem+json"
     assert answer.pointers == pointers
@@ -318,14 +319,14 @@ def test_other_refusals(daemon):
 def test_timing_and_metrics(daemon):
     routed = 'stratus_requests_total{route="/v1/compare",status="200"}'
     compared = 'stratus_stage_duration_seconds_count{stage="compare"}'
-    before = daemon.metric(routed), daemon.metric(compared)
+    before = daemon.settled(routed), daemon.metric(compared)
     answer = compare(daemon, {"scene": SMALL, "variants": PAPER})
     assert {"queue", "view", "readback", "compare", "encode", "total"} <= set(answer.timing)
     assert wait_for(lambda: (daemon.metric(routed), daemon.metric(compared)) == (before[0] + 1, before[1] + 1))
 
 
 def test_deadline(daemon):
-    """Longer than any machine takes for 4 pictures of 4 Mpixel."""
+    """No machine draws 4 pictures of 4 Mpixel so fast."""
     scene = {"output": {"width": 2048, "height": 2048}, "clouds": {"seed": 77}}
     answer = compare(daemon, {"scene": scene, "variants": [{"name": n} for n in "abcd"]}, X_Timeout_Ms="1")
     assert answer.status == 504
@@ -337,7 +338,7 @@ LARGE = {"scene": {"output": {"width": 4096, "height": 1024}, "clouds": {"type":
 @pytest.fixture(scope="module")
 def large(daemon):
     """What comparing and all of the rest take, ms; only the comparing can be longer than the drawing of a clear sky."""
-    answer = compare(daemon, LARGE, X_Timeout_Ms="120000")
+    answer = compare(daemon, LARGE, X_Timeout_Ms="240000")
     assert answer.status == 200
     return {name: float(part["dur"]) for name, part in answer.timing.items()}
 
@@ -346,35 +347,47 @@ def large(daemon):
 def test_deadline_while_comparing(daemon, large, share):
     """Also while figures are made: the answer comes soon after the deadline."""
     deadline = large["total"] - large.get("encode", 0) - (1 - share) * large["compare"]
-    began = time.monotonic()
-    answer = compare(daemon, LARGE, X_Timeout_Ms=str(int(deadline)))
-    took = 1000 * (time.monotonic() - began) - deadline
-    # The machine may be quicker or slower than before: then it is done, or it was drawing.
-    assert answer.status in (200, 504)
-    assert took < max(300, 0.25 * large["compare"])
+
+    def is_soon():
+        began = time.monotonic()
+        # The machine may be quicker or slower than before: then it is done, or it was drawing.
+        assert compare(daemon, LARGE, X_Timeout_Ms=str(int(deadline))).status in (200, 504)
+        return 1000 * (time.monotonic() - began) - deadline < max(300, 0.25 * large["compare"])
+
+    assert in_some_try(is_soon)
 
 
 def test_deadline_while_drawing(daemon):
     """The slab's layers of so many pixels are not drawn at one go."""
-    body = {"scene": {"output": {"width": 4096, "height": 2048}}, "variants": PAPER}
-    whole = compare(daemon, body, X_Timeout_Ms="120000").timing["view"]
-    other = {**body, "scene": {**body["scene"], "clouds": {"seed": 5}}}  # nothing of it is remembered
-    began = time.monotonic()
-    assert compare(daemon, other, X_Timeout_Ms="200").status == 504
-    # The sky and the field, which are not drawn in parts, and a part of the view.
-    assert time.monotonic() - began < 1.5 + 0.3 * float(whole["dur"]) / 1000
+    body = {"scene": {"output": {"width": 4096, "height": 1024}, "sun": {"elevation_deg": 33.5}}, "variants": PAPER}
+    whole = {name: float(part["dur"]) / 1000 for name, part in compare(daemon, body, X_Timeout_Ms="240000").timing.items()}
+    undivided = sum(whole.get(name, 0) for name in ("optics", "sky", "field", "radiosity"))  # not drawn in parts
+    seeds = itertools.count(5)
+
+    def is_soon():
+        other = {**body, "scene": {**body["scene"], "clouds": {"seed": next(seeds)}, "sun": {"elevation_deg": 34}}}  # nothing of it is remembered
+        began = time.monotonic()
+        assert compare(daemon, other, X_Timeout_Ms="200").status == 504
+        return time.monotonic() - began < 0.7 + undivided + 0.25 * whole["view"]
+
+    assert in_some_try(is_soon)
 
 
 def test_leaving_while_comparing(daemon, large):
     ended = 'stratus_renders_ended_total{reason="abandoned"}'
-    before = daemon.metric(ended)
-    connection = daemon.connect()
-    connection.request("POST", "/v1/compare", json.dumps(LARGE), {"Content-Type": "application/json"})
-    time.sleep((large["total"] - large.get("encode", 0) - 0.7 * large["compare"]) / 1000)
-    connection.close()
-    left = time.monotonic()
-    assert wait_for(lambda: daemon.metric(ended) == before + 1)
-    assert time.monotonic() - left < 1 + 0.25 * large["compare"] / 1000
+
+    def ends_soon():
+        before = daemon.metric(ended)
+        connection = daemon.connect()
+        connection.request("POST", "/v1/compare", json.dumps(LARGE), {"Content-Type": "application/json"})
+        time.sleep((large["total"] - large.get("encode", 0) - 0.7 * large["compare"]) / 1000)
+        connection.close()
+        left = time.monotonic()
+        assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 1)
+        # It may have been quicker than before, and have had its answer.
+        return daemon.metric(ended) == before + 1 and time.monotonic() - left < 1 + 0.25 * large["compare"] / 1000
+
+    assert in_some_try(ends_soon)
 
 
 def test_maps_are_compared(daemon, example_map):

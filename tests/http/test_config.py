@@ -10,13 +10,13 @@ import time
 
 import pytest
 
-from conftest import BUILD, KERNEL, ROOT, SANITIZED
+from conftest import ANSWER_SECONDS, BUILD, KERNEL, ROOT
 
 
 def check(*flags, **environment):
     clean = {name: value for name, value in os.environ.items() if not name.startswith("STRATUS_")}
     return subprocess.run(
-        [str(BUILD / "stratusd"), "--check-config", *flags], env={**clean, **environment}, capture_output=True, text=True, timeout=120
+        [str(BUILD / "stratusd"), "--check-config", *flags], env={**clean, **environment}, capture_output=True, text=True, timeout=ANSWER_SECONDS
     )
 
 
@@ -48,11 +48,9 @@ def test_what_it_prints_is_an_environment_that_gives_the_same(state):
 
 
 def test_nothing_is_started(state):
-    began = time.monotonic()
     result = check("--state-dir", state, "--kernel", str(KERNEL), "--listen=127.0.0.1:0", "--log-level=debug")
     assert result.returncode == 0
     assert "listening" not in result.stdout and "gl:" not in result.stderr
-    assert SANITIZED or time.monotonic() - began < 10
 
 
 def test_faults(tmp_path):
@@ -143,7 +141,7 @@ def supervisor(request, tmp_path, monkeypatch):
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     name = str(tmp_path / "notify") if request.param == "path" else f"@stratus-test-{os.getpid()}"
     listener.bind(name.replace("@", "\0"))
-    listener.settimeout(60)
+    listener.settimeout(ANSWER_SECONDS)
     monkeypatch.setenv("NOTIFY_SOCKET", name)
     yield listener
     listener.close()
@@ -167,11 +165,16 @@ def test_supervisor_hears_of_the_life(supervisor, start_daemon):
 def test_supervisor_hears_signs_of_life(supervisor, start_daemon, monkeypatch):
     monkeypatch.setenv("WATCHDOG_USEC", "400000")
     daemon = start_daemon()
-    supervisor.recv(4096)
+    assert supervisor.recv(4096).startswith(b"READY=1")
+    supervisor.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        while supervisor.recv(4096):
+            pass  # what came before the clock starts here
+    supervisor.settimeout(ANSWER_SECONDS)
     began = time.monotonic()
-    for _ in range(5):
+    for _ in range(6):
         assert supervisor.recv(4096) == b"WATCHDOG=1"
-    assert time.monotonic() - began >= 0.9
+    assert time.monotonic() - began >= 0.9  # one each half of the 0.4 s, the first of them at any time
     assert daemon.render({"output": {"width": 32, "height": 24}}).status == 200
     assert daemon.stop() == 0
 

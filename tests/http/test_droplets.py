@@ -1,15 +1,14 @@
 """Droplets that are new: prepared beside the renderer, computed once, kept on disk."""
 import concurrent.futures
-import json
+import itertools
 import signal
-import socket
 import statistics
 import threading
 import time
 
 import pytest
 
-from conftest import wait_for
+from conftest import in_some_try, send, wait_for
 
 SMALL = {"width": 16, "height": 16}
 
@@ -83,20 +82,22 @@ def test_calls_share_one_computation(daemon, path):
 
 def test_pictures_go_on_beside_calls(daemon):
     """Encoding has threads of its own: calls that compute droplets do not keep pictures waiting."""
-    stop = threading.Event()
+    stop, calls = threading.Event(), []
 
     def ask(k):
         for i in range(1000):
             if stop.is_set():
                 return
+            begin = time.monotonic()
             assert daemon.get(f"/v1/slab?optical_thickness=8&dsd.gamma={4 + k + i / 1000}").status == 200
+            calls.append(time.monotonic() - begin)
 
     daemon.render(scene(3.1))
     threads = [threading.Thread(target=ask, args=(k,)) for k in range(8)]
     for thread in threads:
         thread.start()
     try:
-        time.sleep(0.3)
+        assert wait_for(lambda: len(calls) >= 8)  # now eight of them are under way all the time
         took = []
         for i in range(12):
             begin = time.monotonic()
@@ -106,8 +107,8 @@ def test_pictures_go_on_beside_calls(daemon):
         stop.set()
         for thread in threads:
             thread.join()
-    # Behind eight computations of 0.1 s and more in one line it would be near a second.
-    assert statistics.median(took) < 0.25, took
+    # In one line with eight computations each would take as long as these do.
+    assert statistics.median(took) < 0.6 * statistics.median(calls), (took, calls)
 
 
 def test_optics_nobody_waits_for(daemon):
@@ -117,37 +118,40 @@ def test_optics_nobody_waits_for(daemon):
 
 
 def test_timing_says_where_they_came_from(daemon):
-    first, second = daemon.render(scene(3.3)), daemon.render(scene(3.3), Cache_Control="no-cache")
+    first, *others = [daemon.render(scene(3.3), Cache_Control="no-cache") for _ in range(4)]
     assert "desc" not in first.timing["optics"]
-    assert float(first.timing["optics"]["dur"]) > 20
-    assert second.timing["optics"]["desc"] == '"reused"'
-    assert float(second.timing["optics"]["dur"]) < float(first.timing["optics"]["dur"]) / 2
+    assert float(first.timing["optics"]["dur"]) > 5
+    assert all(other.timing["optics"]["desc"] == '"reused"' for other in others)
+    assert min(float(other.timing["optics"]["dur"]) for other in others) < float(first.timing["optics"]["dur"]) / 2
     assert float(first.timing["total"]["dur"]) >= float(first.timing["optics"]["dur"])
 
 
 def test_other_skies_go_on(daemon):
     """Pictures of known droplets keep coming while new ones are computed."""
-    known = scene(3.4)
+    known, numbers = scene(3.4), itertools.count()
     assert daemon.render(known).status == 200
-    done, taken = threading.Event(), []
 
-    def ask_on():
-        while not done.is_set():
-            begin = time.monotonic()
-            assert daemon.render(known, Cache_Control="no-cache").status == 200
-            taken.append(time.monotonic() - begin)
+    def they_go_on():
+        done, taken = threading.Event(), []
 
-    with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        asking = pool.submit(ask_on)
-        answers = [daemon.render(scene(4 + i / 16)) for i in range(8)]
-        done.set()
-        asking.result()
-    assert {a.status for a in answers} == {200}
-    computing = [float(a.timing["optics"]["dur"]) / 1000 for a in answers]
-    print(f"{len(taken)} pictures of known droplets, median {statistics.median(taken):.3f} s, beside 8 computations of"
-          f" {statistics.median(computing):.3f} s")
-    assert len(taken) > 3 * len(answers)
-    assert statistics.median(taken) < statistics.median(computing) / 2
+        def ask_on():
+            while not done.is_set():
+                begin = time.monotonic()
+                assert daemon.render(known, Cache_Control="no-cache").status == 200
+                taken.append(time.monotonic() - begin)
+
+        with concurrent.futures.ThreadPoolExecutor(1) as pool:
+            asking = pool.submit(ask_on)
+            answers = [daemon.render(scene(4 + next(numbers) / 16)) for _ in range(8)]
+            done.set()
+            asking.result()
+        assert {a.status for a in answers} == {200}
+        computing = [float(a.timing["optics"]["dur"]) / 1000 for a in answers]
+        print(f"{len(taken)} pictures of known droplets, median {statistics.median(taken):.3f} s, beside 8 computations of"
+              f" {statistics.median(computing):.3f} s")
+        return len(taken) > 3 * len(answers) and statistics.median(taken) < statistics.median(computing) / 2
+
+    assert in_some_try(they_go_on)
 
 
 def test_kept_on_disk(restart):
@@ -196,7 +200,7 @@ def test_killed_at_any_moment(restart, start_daemon):
         daemon = start_daemon("--state-dir", str(restart.folder.parent))
         together(daemon, [scene(7 + i + k / 8) for k in range(3)])
         daemon.process.send_signal(signal.SIGKILL)
-        assert daemon.process.wait(timeout=60) == -signal.SIGKILL
+        assert daemon.process.wait(timeout=180) == -signal.SIGKILL
     daemon = restart()
     assert wait_for(lambda: not list(restart.folder.glob("*.*")))
     assert daemon.render(scene(7)).status == 200
@@ -232,9 +236,13 @@ def test_bounds_of_memory_and_disk(restart):
     assert sum(f.stat().st_blocks * 512 for f in files) <= 32 << 20
 
 
-def test_full_line(start_daemon):
-    daemon = start_daemon("--queue-length", "1")
-    answers = together(daemon, [scene(11 + i / 16) for i in range(12)])
+def test_full_line(start_faulty):
+    daemon = start_faulty("--queue-length", "1")
+    with concurrent.futures.ThreadPoolExecutor(12) as pool:
+        with daemon.busy():
+            running = [pool.submit(daemon.render, scene(11 + i / 16)) for i in range(12)]
+            assert wait_for(lambda: daemon.metric('stratus_queue_rejected_total{reason="full"}') >= 1)
+        answers = [r.result() for r in running]
     assert {a.status for a in answers} == {200, 503}
     refused = [a for a in answers if a.status == 503]
     for answer in refused:
@@ -270,25 +278,29 @@ def test_deadline_while_preparing(daemon):
     assert daemon.render(scene(14)).status == 200
 
 
-def test_clients_that_leave_while_preparing(start_daemon):
-    daemon = start_daemon()
-    body = [json.dumps(scene(15 + i / 16)).encode() for i in range(8)]
-    for data in body:
-        client = socket.create_connection(("127.0.0.1", daemon.port))
-        client.sendall(b"POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(data) + data)
-        client.close()
-    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 1, 120)
-    assert daemon.metric('stratus_renders_ended_total{reason="abandoned"}') >= 6
-    assert computed(daemon) <= 4
+def test_clients_that_leave_while_preparing(start_faulty):
+    """With room for the droplets of one picture no more are prepared than the renderer, which stands still, can take."""
+    daemon = start_faulty("--droplets-mb", "16")
+    before = computed(daemon)
+    with daemon.busy():
+        for client in [send(daemon, scene(15 + i / 16)) for i in range(8)]:
+            client.close()
+        # Those in work are given up when the renderer goes on.
+        assert wait_for(lambda: daemon.metric('stratus_renders_ended_total{reason="abandoned"}') >= 5)
+    daemon.settle()
+    assert daemon.metric('stratus_renders_ended_total{reason="abandoned"}') == 8
+    assert computed(daemon) - before <= 4
     assert daemon.render(scene(2)).status == 200
 
 
-def test_shutdown_finishes_what_is_prepared(start_daemon):
-    daemon = start_daemon()
+def test_shutdown_finishes_what_is_prepared(start_faulty):
+    daemon = start_faulty()
     scenes = [scene(16 + i / 16) for i in range(6)]
     with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
-        running = [pool.submit(daemon.render, s) for s in scenes]
-        assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") >= 7 or any(r.done() for r in running))
-        daemon.process.send_signal(signal.SIGTERM)
+        with daemon.holding():
+            running = [pool.submit(daemon.render, s) for s in scenes]
+            assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 7)
+            daemon.process.send_signal(signal.SIGTERM)
+            assert wait_for(lambda: "SIGTERM: " in daemon.text)
         assert {r.result().status for r in running} == {200}
-    assert daemon.process.wait(timeout=60) == 0
+    assert daemon.process.wait(timeout=180) == 0

@@ -3,6 +3,7 @@
 The daemon is build/stratusd-faulty: the delivered one, linked with tests/faults/faults.c, which makes what it calls fail when told to.
 """
 import concurrent.futures
+import contextlib
 import http.client
 import json
 import os
@@ -14,52 +15,9 @@ import time
 
 import pytest
 
-from conftest import BUILD, KERNEL, ROOT, SANITIZED, Daemon, wait_for
+from conftest import BUILD, KERNEL, ROOT, FaultyDaemon, in_some_try, wait_for
 
 SMALL = {"width": 64, "height": 48}
-SLOW = 5 if SANITIZED else 1
-
-
-class FaultyDaemon(Daemon):
-    def __init__(self, folder, *flags):
-        self.faults = folder / "faults"
-        self.faults.mkdir()
-        super().__init__(folder, *flags, program=("stratusd-faulty", "--faults", str(self.faults)))
-
-    def fail(self, name, number=0):
-        os.symlink(str(number), self.faults / name)
-
-    def heal(self, name):
-        (self.faults / name).unlink()
-
-    def has_failed(self, name):
-        return not os.path.lexists(self.faults / name)
-
-    def resets(self, reason):
-        return self.metric(f'stratus_gl_context_resets_total{{reason="{reason}"}}')
-
-    def is_ready(self):
-        return self.get("/readyz").status == 200
-
-    @property
-    def text(self):
-        return self.log.read_text(errors="replace")
-
-
-@pytest.fixture
-def start_faulty(tmp_path):
-    started = []
-
-    def start(*flags):
-        folder = tmp_path / f"faulty{len(started)}"
-        folder.mkdir()
-        started.append(FaultyDaemon(folder, *flags))
-        return started[-1]
-
-    yield start
-    for daemon in started:
-        daemon.stop()
-        daemon.assert_clean()
 
 
 @pytest.fixture(scope="module")
@@ -120,9 +78,12 @@ def test_a_lost_context(faulty, after):
 
 def test_a_context_lost_in_the_middle_of_a_picture(faulty):
     repeated = faulty.metric("stratus_renders_repeated_total")
-    faulty.fail("gl-reset", 2)  # the first passes of a new sky ask more often
-    answer = faulty.render({"sun": {"elevation_deg": 12.25}, "clouds": {"seed": 99}, "output": {"width": 320, "height": 240}})
-    assert answer.status == 200
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        with faulty.holding():
+            running = pool.submit(faulty.render, {"sun": {"elevation_deg": 12.25}, "clouds": {"seed": 99}, "output": {"width": 320, "height": 240}})
+            assert wait_for(faulty.is_held)
+            faulty.fail("gl-reset", 2)  # the passes of a new sky ask more often
+        assert running.result().status == 200
     assert faulty.metric("stratus_renders_repeated_total") == repeated + 1
 
 
@@ -134,8 +95,8 @@ def test_a_scene_that_loses_every_context(faulty):
     assert answer.status == 500
     assert answer.json["type"] == "urn:stratus:problem:render-failed"
     faulty.heal("poison")
+    assert wait_for(lambda: faulty.resets("guilty") == resets + 2)
     assert wait_for(faulty.is_ready)
-    assert faulty.resets("guilty") == resets + 2
     assert faulty.render({"output": {"width": 333, "height": 48}}).status == 200
 
 
@@ -143,11 +104,12 @@ def test_failures_on_end(faulty):
     """Of renders that fail without the driver's saying why each is answered so, and after the third the renderer is made anew."""
     scene = {"clouds": {"seed": 90}, "output": SMALL}
     faulty.render(scene)
+    resets = faulty.resets("failures")
     for turn in range(3):
-        assert faulty.resets("failures") == 0
+        assert faulty.resets("failures") == resets
         faulty.fail("gl-error")
         assert faulty.render({**scene, "camera": {"azimuth_deg": 10 * turn}}).status == 500
-    assert wait_for(lambda: faulty.resets("failures") == 1)
+    assert wait_for(lambda: faulty.resets("failures") == resets + 1)
     assert wait_for(faulty.is_ready)
     assert faulty.render(scene, Cache_Control="no-cache").status == 200
 
@@ -168,9 +130,10 @@ def test_a_reference_over_a_reset(faulty):
     reference = {"model": {"name": "reference", "samples": 32, "seed": 8}, "output": {"width": 64, "height": 48}}
     resets, repeated = faulty.resets("guilty"), faulty.metric("stratus_renders_repeated_total")
     with concurrent.futures.ThreadPoolExecutor(1) as pool:
-        running = pool.submit(faulty.render, reference)
-        assert wait_for(lambda: faulty.metric("stratus_requests_in_flight") == 2)
-        faulty.fail("gl-reset", 1)
+        with faulty.holding():
+            running = pool.submit(faulty.render, reference)
+            assert wait_for(faulty.is_held)
+            faulty.fail("gl-reset", 12)  # its passes ask more often
         answer = running.result()
     assert answer.status == 200 and answer.headers["Stratus-Samples"] == "32"
     assert faulty.resets("guilty") == resets + 1
@@ -280,7 +243,7 @@ def test_start_with_a_shader_that_does_not_compile(tmp_path):
 
 def test_a_device_that_hangs(start_faulty):
     """Not ready at once, what waits is refused, and the process ends with a status that has it started again."""
-    daemon = start_faulty("--hang-ms", str(1500 * SLOW), "--golden-s", "0")
+    daemon = start_faulty("--hang-ms", "6000")
     probe = daemon.connect()
     probe.request("GET", "/readyz")
     assert probe.getresponse().read()
@@ -289,12 +252,10 @@ def test_a_device_that_hangs(start_faulty):
         hanging = pool.submit(daemon.render, {"clouds": {"seed": 1}, "output": SMALL})
         assert wait_for(lambda: daemon.has_failed("hang"))
         waiting = [pool.submit(daemon.render, {"clouds": {"seed": 2 + i}, "output": SMALL}) for i in range(3)]
-        begin = time.monotonic()
         answers = [w.result() for w in waiting]
         assert [a.status for a in answers] == [503] * 3
         assert {a.json["type"] for a in answers} == {"urn:stratus:problem:renderer-unavailable"}
-        assert daemon.process.wait(timeout=60) == 3
-        assert time.monotonic() - begin < 30
+        assert daemon.process.wait(timeout=180) == 3
         with pytest.raises((ConnectionError, http.client.HTTPException)):
             hanging.result()
     assert "the renderer hangs or is gone" in daemon.text
@@ -305,7 +266,7 @@ def test_a_device_that_hangs(start_faulty):
 
 
 def test_a_context_that_grows_is_made_anew(start_faulty):
-    daemon = start_faulty("--recycle-mb", "400", "--golden-s", "0")
+    daemon = start_faulty("--recycle-mb", "400")
     before = daemon.metric("stratus_process_resident_memory_bytes")
     daemon.render({"output": SMALL})
     time.sleep(1.5)
@@ -323,58 +284,68 @@ def test_a_context_that_grows_is_made_anew(start_faulty):
 # --- signals -------------------------------------------------------------------------------------------------------------------------
 
 
-def busy(daemon, pool, count=3, seconds=1):
-    """So many accepted renders, the first of which takes so long."""
-    daemon.fail("hang", seconds)
-    running = [pool.submit(daemon.render, {"clouds": {"seed": 20 + i}, "output": SMALL}) for i in range(count)]
-    assert wait_for(lambda: daemon.has_failed("hang") and daemon.metric("stratus_requests_in_flight") == count + 1)
-    return running
+@contextlib.contextmanager
+def busy(daemon, pool, count=3):
+    """So many accepted renders, the first of which stands still until this is left."""
+    with daemon.holding():
+        running = [pool.submit(daemon.render, {"clouds": {"seed": 20 + i}, "output": SMALL}) for i in range(count)]
+        assert wait_for(lambda: daemon.is_held() and daemon.metric("stratus_requests_in_flight") == count + 1)
+        yield running
 
 
 def test_drain(start_faulty):
     """Readiness goes first, what was accepted is finished, and the status is 0."""
     daemon = start_faulty()
-    probe = daemon.connect()
-    probe.request("GET", "/readyz")
-    probe.getresponse().read()
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
-        running = busy(daemon, pool, seconds=2)
-        daemon.process.send_signal(signal.SIGTERM)
-        assert wait_for(lambda: "SIGTERM: finishing accepted work" in daemon.text)
-        probe.request("GET", "/readyz")
-        answer = probe.getresponse()
-        assert (answer.status, json.loads(answer.read())["status"]) == (503, "stopping")
-        assert not any(r.done() for r in running)
+        with busy(daemon, pool) as running:
+            probe = daemon.connect()
+            probe.request("GET", "/readyz")
+            probe.getresponse().read()
+            daemon.process.send_signal(signal.SIGTERM)
+            assert wait_for(lambda: "SIGTERM: finishing accepted work" in daemon.text)
+            probe.request("GET", "/readyz")
+            answer = probe.getresponse()
+            assert (answer.status, json.loads(answer.read())["status"]) == (503, "stopping")
+            assert not any(r.done() for r in running)
         assert [r.result().status for r in running] == [200] * 3
     probe.close()
-    assert daemon.process.wait(timeout=60) == 0
+    assert daemon.process.wait(timeout=180) == 0
 
 
 def test_a_second_signal_ends_at_once(start_faulty):
-    daemon = start_faulty()
-    with concurrent.futures.ThreadPoolExecutor(4) as pool:
-        running = busy(daemon, pool, seconds=60)
-        daemon.process.send_signal(signal.SIGTERM)
-        assert wait_for(lambda: "SIGTERM: finishing accepted work" in daemon.text)
-        daemon.process.send_signal(signal.SIGTERM)
-        time.sleep(1.2)
-        assert daemon.process.poll() is None  # a signal that comes twice is one
-        daemon.process.send_signal(signal.SIGTERM)
-        assert daemon.process.wait(timeout=20) == 1
-        for one in running:
-            with pytest.raises((ConnectionError, http.client.HTTPException)):
-                one.result()
-    assert "stopped at once by a second signal" in daemon.text
+    """But for one within a second: a signal that comes twice is one."""
+
+    def goes_on_after_both():
+        daemon = start_faulty()
+        with concurrent.futures.ThreadPoolExecutor(4) as pool:
+            with busy(daemon, pool) as running:
+                begin = time.monotonic()
+                daemon.process.send_signal(signal.SIGTERM)
+                assert wait_for(lambda: "SIGTERM: finishing accepted work" in daemon.text)
+                daemon.process.send_signal(signal.SIGTERM)
+                within = time.monotonic() - begin < 1
+                time.sleep(1.2)
+                went_on = daemon.process.poll() is None
+                daemon.process.send_signal(signal.SIGTERM)
+                assert daemon.process.wait(timeout=180) == 1
+            for one in running:
+                with pytest.raises((ConnectionError, http.client.HTTPException)):
+                    one.result()
+        assert "stopped at once by a second signal" in daemon.text
+        return within and went_on
+
+    assert in_some_try(goes_on_after_both)
 
 
 def test_a_reset_while_draining(start_faulty):
     daemon = start_faulty()
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
-        running = busy(daemon, pool)
-        daemon.fail("gl-reset", 1)
-        daemon.process.send_signal(signal.SIGTERM)
+        with busy(daemon, pool) as running:
+            daemon.fail("gl-reset", 1)
+            daemon.process.send_signal(signal.SIGTERM)
+            assert wait_for(lambda: "SIGTERM: finishing accepted work" in daemon.text)
         assert [r.result().status for r in running] == [200] * 3
-    assert daemon.process.wait(timeout=60) == 0
+    assert daemon.process.wait(timeout=180) == 0
     assert daemon.has_failed("gl-reset")
 
 
@@ -388,5 +359,5 @@ def test_a_device_that_is_gone_for_good(doomed):
     assert [a.status for a in answers] == [503] * 2
     assert {a.json["type"] for a in answers} == {"urn:stratus:problem:renderer-unavailable"}
     assert all(int(a.headers["Retry-After"]) >= 1 for a in answers)
-    assert daemon.process.wait(timeout=60) == 3
+    assert daemon.process.wait(timeout=180) == 3
     assert "8 of 8 tries to bring it up again failed" in daemon.text

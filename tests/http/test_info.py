@@ -12,7 +12,7 @@ PLACE = {"time": "2024-06-21T14:00:00.25+02:00", "latitude_deg": 48, "longitude_
 
 
 def info(path, *options):
-    return subprocess.run([str(BUILD / "stratus"), "info", *options, str(path)], capture_output=True, text=True, timeout=60)
+    return subprocess.run([str(BUILD / "stratus"), "info", *options, str(path)], capture_output=True, text=True, timeout=180)
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import time
 
 import pytest
 
-from conftest import Daemon, wait_for
+from conftest import FaultyDaemon, in_some_try, send, wait_for
 
-READ_SECONDS = 2
+READ_SECONDS = 3
 FLAGS = {
     "--queue-length": 8, "--queue-mpixels": 4, "--picture-mpixels": 4, "--memory-mb": 64, "--connections": 24, "--connections-per-address": 10,
     "--header-max-kb": 4, "--body-max-kb": 2, "--read-timeout-s": READ_SECONDS,
@@ -21,14 +21,14 @@ POST = b"POST /v1/render HTTP/1.1\r\n" + HOST + b"Content-Type: application/json
 @pytest.fixture(scope="module")
 def strict(tmp_path_factory):
     flags = [str(part) for flag in FLAGS.items() for part in flag]
-    daemon = Daemon(tmp_path_factory.mktemp("strict"), *flags)
+    daemon = FaultyDaemon(tmp_path_factory.mktemp("strict"), *flags)
     yield daemon
     assert daemon.stop() == 0
     daemon.assert_clean()
 
 
 def connect(daemon, address="127.0.0.1"):
-    return socket.create_connection(("127.0.0.1", daemon.port), timeout=60, source_address=(address, 0))
+    return socket.create_connection(("127.0.0.1", daemon.port), timeout=180, source_address=(address, 0))
 
 
 def read_all(client):
@@ -98,38 +98,43 @@ def test_memory_of_one_picture(strict):
 
 
 def test_memory_and_pixels_of_all(strict):
-    """A picture of 4 megapixels as EXR takes 48 MB and more for a while: a second one is refused, what is small is not."""
-    large = {"output": {"width": 1536, "height": 1536, "format": "exr"}, "camera": {"elevation_deg": 90}}
+    """A picture of 2.4 megapixels as EXR takes 54 MiB for a while: a second one is refused, what is small is not."""
+    large = {"output": {"width": 1536, "height": 1536, "format": "exr"}, "clouds": {"type": "none"}, "camera": {"elevation_deg": 90}}
     small = {"output": {"width": 64, "height": 48}}
+    rejected = strict.metric('stratus_queue_rejected_total{reason="memory"}')
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        running = pool.submit(strict.render, large)
-        assert wait_for(lambda: strict.metric("stratus_picture_memory_bytes") > 50e6 or running.done())
-        refused = strict.render({**large, "camera": {"elevation_deg": 80}})
-        assert not running.done()
-        assert refused.status == 503 and refused.json["type"] == "urn:stratus:problem:memory-limit"
-        assert "--memory-mb" in refused.json["detail"] and int(refused.headers["Retry-After"]) >= 1
-        assert running.result().status == 200
+        with strict.holding():
+            running = pool.submit(strict.render, large)
+            assert wait_for(lambda: strict.metric("stratus_picture_memory_bytes") > 50e6)
+            refused = strict.render({**large, "camera": {"elevation_deg": 80}})
+            assert refused.status == 503 and refused.json["type"] == "urn:stratus:problem:memory-limit"
+            assert "--memory-mb" in refused.json["detail"] and int(refused.headers["Retry-After"]) >= 1
+            waiting = pool.submit(strict.render, small)
+            assert wait_for(lambda: strict.metric("stratus_requests_in_flight") == 3)
+        assert running.result().status == waiting.result().status == 200
     assert strict.render(small).status == 200
     assert wait_for(lambda: strict.metric("stratus_picture_memory_bytes") == 0)
-    assert strict.metric('stratus_queue_rejected_total{reason="memory"}') >= 1
+    assert strict.metric('stratus_queue_rejected_total{reason="memory"}') == rejected + 1
 
 
 def test_megapixels_that_wait(strict):
     """One runs, three of 1.2 megapixels wait, the fourth of them is one too many, though a small one may wait still."""
     scenes = [{"clouds": {"seed": 10 + i}, "output": {"width": 1280, "height": 960}} for i in range(4)]
-    with concurrent.futures.ThreadPoolExecutor(8) as pool:
-        running = [pool.submit(strict.render, {"clouds": {"seed": 1}, "output": {"width": 2048, "height": 2048}})]
-        assert wait_for(lambda: strict.metric("stratus_queue_backlog_seconds") > 0 and strict.metric("stratus_queue_depth") == 0)
-        for i in range(3):
-            running.append(pool.submit(strict.render, scenes[i]))
-            assert wait_for(lambda: strict.metric("stratus_queue_depth") == i + 1 or running[0].done())
-        refused = strict.render(scenes[3])
-        if not running[0].done():
+    rejected = strict.metric('stratus_queue_rejected_total{reason="pixels"}')
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        with strict.busy():
+            waiting = [send(strict, scene) for scene in scenes[:3]]
+            assert wait_for(lambda: strict.metric("stratus_queue_depth") == 3)
+            refused = strict.render(scenes[3])
             assert refused.status == 503 and refused.json["type"] == "urn:stratus:problem:queue-full"
             assert "--queue-mpixels" in refused.json["detail"] and refused.json["queue_depth"] == 3
-            assert strict.metric('stratus_queue_rejected_total{reason="pixels"}') == 1
-        assert strict.render({"output": {"width": 64, "height": 48}}).status == 200
-        assert all(r.result().status == 200 for r in running)
+            assert strict.metric('stratus_queue_rejected_total{reason="pixels"}') == rejected + 1
+            small = pool.submit(strict.render, {"output": {"width": 64, "height": 48}, "clouds": {"seed": 14}})
+            assert wait_for(lambda: strict.metric("stratus_queue_depth") == 4)
+            for client in waiting:  # nothing of theirs need be rendered for this
+                client.close()
+            assert wait_for(lambda: strict.metric("stratus_queue_depth") == 1)
+        assert small.result().status == 200
 
 
 # --- connections -------------------------------------------------------------------------------------------------------------------
@@ -151,12 +156,17 @@ def test_connections_of_an_address(strict):
         with connect(strict, "127.0.0.5") as idle:
             assert idle.recv(1) == b""
         assert time.monotonic() - began < 20
-        surplus = [connect(strict, "127.0.0.5") for _ in range(8)]
-        # As soon as all of them are counted, which takes a moment, and before they are closed.
-        assert wait_for(lambda: ask(strict, b"GET /healthz HTTP/1.1\r\n" + HOST + b"\r\n", "127.0.0.5") == b"", 2)
+
+        def is_refused():
+            """With eight more, before they are closed; as soon as all of them are counted, which takes a moment."""
+            surplus = [connect(strict, "127.0.0.5") for _ in range(8)]
+            closed = ask(strict, b"GET /healthz HTTP/1.1\r\n" + HOST + b"\r\n", "127.0.0.5") == b""
+            for client in surplus:
+                client.close()
+            return closed
+
+        assert wait_for(is_refused)
         assert strict.metric('stratus_connections_dropped_total{reason="refused"}') >= 1
-        for client in surplus:
-            client.close()
     finally:
         for client in held:
             client.close()
@@ -189,10 +199,10 @@ def trickle(daemon, begin, piece):
     with connect(daemon) as client:
         client.sendall(begin)
         client.settimeout(0.2)
-        while time.monotonic() - began < 30:
+        while time.monotonic() - began < 180:
             try:
                 answer = client.recv(65536)
-                client.settimeout(10)
+                client.settimeout(180)
                 return answer + (read_all(client) if answer else b""), time.monotonic() - began
             except socket.timeout:
                 pass
@@ -207,7 +217,8 @@ def trickle(daemon, begin, piece):
 
 def test_slow_requests_are_closed(strict):
     """Header, body, upload and nothing at all after the first byte; a healthy client is served beside them."""
-    slow = strict.metric('stratus_connections_dropped_total{reason="slow"}')
+    dropped, rendered = 'stratus_connections_dropped_total{reason="slow"}', 'stratus_requests_total{route="/v1/render",status="408"}'
+    before = strict.settled(dropped), strict.settled(rendered)
     openings = [
         (b"GET /healthz HTTP/1.1\r\n" + HOST, b"X: 1\r\n"),
         (b"GET /he", b"a"),
@@ -222,22 +233,25 @@ def test_slow_requests_are_closed(strict):
             answer, seconds = end.result()
             assert status_of(answer) == 408, (opening, answer)
             assert problem_of(answer)["type"] == "urn:stratus:problem:request-timeout"
-            assert READ_SECONDS - 0.1 <= seconds < READ_SECONDS + 15, opening
-    assert strict.metric('stratus_connections_dropped_total{reason="slow"}') == slow + len(openings)
-    assert wait_for(lambda: strict.metric('stratus_requests_total{route="/v1/render",status="408"}') == 2)
+            assert READ_SECONDS - 0.1 <= seconds, opening
+    assert wait_for(lambda: (strict.metric(dropped), strict.metric(rendered)) == (before[0] + len(openings), before[1] + 2))
     assert strict.get("/v1/assets/slow").status == 404
 
 
 def test_a_slow_but_steady_body_is_read(strict):
-    """Two seconds and more: within the time for the headers and the body each, since time counts for them apart."""
+    """More than there is for either: within the time for the headers and the body each, since time counts for them apart."""
     body = b"{x}"
-    with connect(strict) as client:
-        client.sendall(POST)
-        time.sleep(0.7 * READ_SECONDS)
-        client.sendall(b"Connection: close\r\nContent-Length: %d\r\n\r\n" % len(body))
-        time.sleep(0.7 * READ_SECONDS)
-        client.sendall(body)
-        assert status_of(read_all(client)) == 400
+
+    def is_read():
+        with connect(strict) as client:
+            client.sendall(POST)
+            time.sleep(0.6 * READ_SECONDS)
+            client.sendall(b"Connection: close\r\nContent-Length: %d\r\n\r\n" % len(body))
+            time.sleep(0.6 * READ_SECONDS)
+            client.sendall(body)
+            return status_of(read_all(client)) == 400
+
+    assert in_some_try(is_read)
 
 
 # --- what is no request ------------------------------------------------------------------------------------------------------------
@@ -265,10 +279,8 @@ MALFORMED = {
 
 @pytest.mark.parametrize("request_bytes, status", MALFORMED.values(), ids=MALFORMED.keys())
 def test_malformed(strict, request_bytes, status):
-    """Answered at once, and the connection is closed: what follows might be anything."""
-    began = time.monotonic()
+    """Answered for what it is and not for its slowness, and the connection is closed: what follows might be anything."""
     assert status_of(ask(strict, request_bytes)) == status
-    assert time.monotonic() - began < READ_SECONDS
     assert strict.get("/healthz").status == 200
 
 
@@ -282,6 +294,7 @@ def test_truncated_body(strict):
     def ended():
         return sum(strict.metric(f'stratus_requests_total{{route="/v1/render",status="{status}"}}') for status in (408, 499))
 
+    strict.settle()
     before = ended()
     with connect(strict) as client:
         client.sendall(POST + b"Content-Length: 100\r\n\r\n{")

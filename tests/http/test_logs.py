@@ -2,7 +2,6 @@
 import json
 import re
 import socket
-import time
 
 import pytest
 
@@ -31,10 +30,9 @@ def parse_text(line):
 
 
 def records(daemon, form):
-    lines = daemon.log.read_text().splitlines()
     if form == "json":
-        return [json.loads(line) for line in lines]
-    return [parse_text(line) for line in lines if " request id=" in line]
+        return [json.loads(line) for line in daemon.lines]
+    return [parse_text(line) for line in daemon.lines if " request id=" in line]
 
 
 def requests_of(daemon, form):
@@ -109,9 +107,9 @@ def test_line_of_a_picture(start_daemon, form):
 def test_every_line_is_an_object(start_daemon):
     """From the first to the last, of requests that cannot be read and of clients that leave too."""
     daemon = start_daemon("--log-format=json", "--log-level=debug")
-    with socket.create_connection(("127.0.0.1", daemon.port), timeout=60) as client:
+    with socket.create_connection(("127.0.0.1", daemon.port), timeout=180) as client:
         client.sendall(b"GET /some\xff\xc3\xa9\"where HTTP/1.1\r\nHos")
-        time.sleep(0.5)  # libmicrohttpd overlooks an end that comes with the bytes before it, until the time for headers is over
+        daemon.await_reading(client)  # libmicrohttpd overlooks an end that comes with the bytes before it, until the time for headers is over
     wait_for_requests(daemon, "json", 1)
     daemon.render({**SMALL, "ground": {"map": "none\n\"x"}})
     assert daemon.stop() == 0

@@ -6,6 +6,8 @@ import pathlib
 import numpy
 import pytest
 
+from conftest import wait_for
+
 REFERENCE = json.loads((pathlib.Path(__file__).parents[1] / "data" / "sky.json").read_text())
 BANDS = ["650", "550", "450"]
 CLEAN = {"atmosphere.aerosol_optical_depth": 0, "atmosphere.ozone_du": 0, "ground.type": "black"}
@@ -153,6 +155,6 @@ def test_deadline(daemon):
 
 def test_counted_under_its_own_label(daemon):
     sample = 'stratus_requests_total{route="/v1/sky",status="200"}'
-    before = daemon.metric(sample)
+    before = daemon.settled(sample)
     daemon.get("/v1/sky")
-    assert daemon.metric(sample) == before + 1
+    assert wait_for(lambda: daemon.metric(sample) == before + 1)

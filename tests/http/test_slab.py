@@ -11,7 +11,7 @@ import time
 import numpy
 import pytest
 
-from conftest import SANITIZED, wait_for
+from conftest import SANITIZED, in_some_try, wait_for
 
 REFERENCE = json.loads((pathlib.Path(__file__).parents[1] / "data" / "slab.json").read_text())
 FLUXES = ("reflectance", "transmittance_direct", "transmittance_diffuse")
@@ -507,7 +507,7 @@ def test_headers(daemon):
 def test_conditional_requests(daemon):
     layer = {"optical_thickness": 2, "sun_zenith_deg": 60, "shading": "montecarlo", "photons": 1000}
     traced = "stratus_photons_total"
-    before = daemon.metric(traced)
+    before = daemon.settled(traced)
     first = daemon.get(target(**layer))
     assert first.status == 200 and daemon.metric(traced) == before + 3000
     tag = first.headers["ETag"]
@@ -532,12 +532,15 @@ def test_conditional_requests(daemon):
 
 def test_deadline(daemon):
     ended = 'stratus_tracings_ended_total{reason="expired"}'
-    before = daemon.metric(ended)
-    start = time.monotonic()
-    answer = daemon.get(target(**LONG), X_Timeout_Ms="300")
-    assert answer.status == 504 and answer.json["type"] == "urn:stratus:problem:deadline-passed"
-    assert time.monotonic() - start < (10 if SANITIZED else 2)
-    assert daemon.metric(ended) == before + 1
+
+    def is_soon():
+        before, start = daemon.metric(ended), time.monotonic()
+        answer = daemon.get(target(**LONG), X_Timeout_Ms="300")
+        assert answer.status == 504 and answer.json["type"] == "urn:stratus:problem:deadline-passed"
+        assert daemon.metric(ended) == before + 1
+        return time.monotonic() - start < (10 if SANITIZED else 2)
+
+    assert in_some_try(is_soon)
     assert daemon.get(target(optical_thickness=1.2345, dsd__gamma=3.21), X_Timeout_Ms="1").status == 504
     assert daemon.get("/v1/optics?dsd.gamma=3.4321", X_Timeout_Ms="1").status == 504
 
@@ -550,9 +553,12 @@ def test_two_tracings_at_once(daemon):
 
 
 def start_long(daemon):
-    """A tracing that nobody reads the answer of."""
+    """A tracing that nobody reads the answer of, and that is under way."""
     client = socket.create_connection(("127.0.0.1", daemon.port))
     client.sendall(f"GET {target(**LONG)} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2)
+    time.sleep(0.3)  # on its way into the line
+    assert wait_for(lambda: daemon.metric("stratus_tracings_waiting") == 0)  # and out of it: the thread that traces stands behind all others
     return client
 
 
@@ -560,14 +566,18 @@ def test_load(start_daemon):
     """One tracing runs, four wait, more are refused; deadlines of those that wait do not depend on it; pictures go on."""
     daemon = start_daemon()
     running = start_long(daemon)
-    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2)
-    time.sleep(0.5)
-    assert wait_for(lambda: daemon.metric("stratus_tracings_waiting") == 0)  # the thread that traces stands behind all others
+    late = 0
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
-        waiting = [pool.submit(daemon.get, target(seed=i, **LONG), X_Timeout_Ms="10000") for i in range(4)]
-        assert wait_for(lambda: daemon.metric("stratus_tracings_waiting") == 4)
-        refused = daemon.get(target(**LONG))
-        assert refused.status == 503 and int(refused.headers["Retry-After"]) >= 1
+        for seconds in (4, 16, 64):  # long enough here for another to come before they are over
+            waiting = [pool.submit(daemon.get, target(seed=i, **LONG), X_Timeout_Ms=str(1000 * seconds)) for i in range(4)]
+            late += 4
+            full = wait_for(lambda: daemon.metric("stratus_tracings_waiting") == 4 or any(request.done() for request in waiting))
+            refused = daemon.get(target(seed=4, **LONG), X_Timeout_Ms="500")
+            if refused.status == 503:
+                break
+            late += 1
+            concurrent.futures.wait(waiting)
+        assert full and refused.status == 503 and int(refused.headers["Retry-After"]) >= 1
         assert refused.json["type"] == "urn:stratus:problem:queue-full"
         assert daemon.render({"output": {"width": 64, "height": 48}}).status == 200
         assert daemon.get(target(optical_thickness=1)).status == 200
@@ -578,20 +588,18 @@ def test_load(start_daemon):
     with pytest.raises(BlockingIOError):
         running.recv(1)
     running.close()
-    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 1)
+    daemon.settle()
     assert daemon.metric('stratus_queue_rejected_total{reason="full"}') == 1
-    assert daemon.metric('stratus_tracings_ended_total{reason="expired"}') == 4
+    assert daemon.metric('stratus_tracings_ended_total{reason="expired"}') == late
     assert daemon.metric('stratus_tracings_ended_total{reason="abandoned"}') == 1
 
 
 def test_clients_that_leave(start_daemon):
     daemon = start_daemon()
-    for _ in range(3):
-        client = start_long(daemon)
-        time.sleep(0.3)
-        client.close()
-    ended = 'stratus_tracings_ended_total{reason="abandoned"}'
-    assert wait_for(lambda: daemon.metric(ended) == 3, 20)
+    for left in range(3):
+        start_long(daemon).close()
+        assert wait_for(lambda: daemon.metric('stratus_tracings_ended_total{reason="abandoned"}') == left + 1)
+        daemon.settle()
     assert daemon.get(target(optical_thickness=1, shading="montecarlo", photons=1000)).status == 200
 
 
@@ -599,11 +607,11 @@ def test_shutdown_does_not_wait_for_photons(start_daemon):
     daemon = start_daemon()
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         running = [pool.submit(daemon.get, target(seed=i, **LONG)) for i in range(2)]
-        assert wait_for(lambda: daemon.metric("stratus_tracings_waiting") == 1)
+        assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 3)
         start = time.monotonic()
         daemon.process.send_signal(signal.SIGTERM)
         for request in running:
             answer = request.result()
             assert answer.status == 503 and answer.json["type"] == "urn:stratus:problem:shutting-down"
-    assert daemon.process.wait(timeout=30) == 0
-    assert time.monotonic() - start < 10
+    assert daemon.process.wait(timeout=180) == 0
+    assert time.monotonic() - start < 60  # they take minutes

@@ -49,7 +49,7 @@ static struct fixture *start(double tables, size_t limit)
 		waiter->scene.dsd = (struct scene_dsd){100 + i, 12, 6};
 		waiter->scene.model.shading = SHADING_SOLVED;
 		waiter->job = (struct render_job){
-			.scene = &waiter->scene, .deadline_ms = clock_now_ms() + 60000, .abandoned = has_left, .finished = end};
+			.scene = &waiter->scene, .deadline_ms = clock_now_ms() + 600000, .abandoned = has_left, .finished = end};
 	}
 	return fixture;
 }
@@ -82,7 +82,7 @@ static int render_next(struct fixture *fixture)
 
 static void await_depth(struct fixture *fixture, size_t waiting, size_t prepared)
 {
-	double limit = clock_now_ms() + 60000;
+	double limit = clock_now_ms() + 180000;
 	while (preparation_depth(fixture->preparation) != waiting || render_queue_depth(fixture->queue) != prepared) {
 		assert_true(clock_now_ms() < limit);
 		usleep(1000);

@@ -44,7 +44,7 @@ static bool is_over(struct work *work)
 
 static void await(const _Atomic bool *flag)
 {
-	for (int i = 0; i < 100000 && !*flag; i++)
+	for (int i = 0; i < 1000000 && !*flag; i++)
 		usleep(100);
 	assert_true(*flag);
 }

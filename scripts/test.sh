@@ -1,13 +1,15 @@
 #!/bin/bash
 # Runs every test against the programs in BUILD_DIR: test.sh BUILD_DIR. The last line is "N passed, N failed".
 # After the plain build the tests of programs are repeated with sanitizers; STRATUS_QUICK=1 leaves that out.
+# What fails beside others is run once more at the end, alone, and counts by that; it is named as "unsteady: NAME" before the last line.
 set -uo pipefail
 B=${1:-build}
-SAN=${SAN:-}
+SAN=${SAN:-} sanitized=
 python=/usr/bin/python3 # Debian's, which sees the packages installed for the tests
 results=$(mktemp -d)
 trap 'rm -rf "$results"' EXIT
 passed=0 failed=0
+touch "$results"/{units,tests,unsteady}.again
 
 count() { # count PASSED FAILED
 	passed=$((passed + $1))
@@ -15,14 +17,19 @@ count() { # count PASSED FAILED
 }
 
 # One unit test program, with its arguments. cmocka's own count where it ended in order, else one failure; 77 means that it cannot run here.
+# The first time a failure is put off, unless a sanitizer reports it.
 run_unit() {
 	local program=$1 output status ok bad
-	shift
 	echo "== ${program#"$B"/}"
-	output=$(timeout 1500 "$program" "$@" 2>&1)
+	output=$(timeout 1500 "$@" 2>&1)
 	status=$?
 	if [ $status = 77 ]; then
 		echo "skipped"
+		return
+	fi
+	[ $status = 0 ] || echo "$output (exit status $status)"
+	if [ $status != 0 ] && [ -z "${is_alone:-}" ] && ! grep -qE 'Sanitizer|runtime error:' <<<"$output"; then
+		echo "$*" >>"$results/units.again"
 		return
 	fi
 	ok=$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p' <<<"$output" | tail -1)
@@ -32,7 +39,6 @@ run_unit() {
 	elif [ $status = 0 ] && [ -z "$ok" ]; then
 		ok=1 # a program without cmocka
 	fi
-	[ $status = 0 ] || echo "$output (exit status $status)"
 	echo "${ok:-0} passed, ${bad:-0} failed in ${program##*/}"
 	count "${ok:-0}" "${bad:-0}"
 }
@@ -65,17 +71,31 @@ run_pytest() {
 	STRATUS_BUILD=$B $python -m pytest -q -p no:cacheprovider --junitxml="$report" "$@"
 	status=$?
 	[ $status = 5 ] && return
-	counts=$($python - "$report" <<'END'
-import sys, xml.etree.ElementTree as tree
-suites = list(tree.parse(sys.argv[1]).iter("testsuite"))
-total = lambda name: sum(int(suite.get(name, 0)) for suite in suites)
-bad = total("failures") + total("errors")
-print(total("tests") - bad - total("skipped"), bad)
-END
-	) || counts="0 1"
-	[ $status != 0 ] && [ "${counts#* }" = 0 ] && counts="${counts% *} 1"
+	counts=$($python scripts/test_report.py "$report" "$results/tests.again") || counts="0 1"
+	[ $status -gt 1 ] && [ "${counts#* }" = 0 ] && counts="${counts% *} 1"
 	# shellcheck disable=SC2086
 	count $counts
+}
+
+# Beside the others time was taken from them; now there is nothing else.
+run_again() {
+	local is_alone=1 before
+	while read -r -u 3 program seeds; do
+		before=$failed
+		echo "== again, alone"
+		# shellcheck disable=SC2086
+		STRATUS_IMAGE_MODULE=$B/stratus-image.so run_unit "$program" $seeds
+		[ "$failed" != "$before" ] || echo "unsteady: $program" >>"$results/unsteady.again"
+	done 3<"$results/units.again"
+	while read -r -u 3 name; do
+		echo "== again, alone: $name"
+		if STRATUS_BUILD=$B $python -m pytest -q -p no:cacheprovider "$name" 3<&-; then
+			count 1 0
+			echo "unsteady: $name" >>"$results/unsteady.again"
+		else
+			count 0 1
+		fi
+	done 3<"$results/tests.again"
 }
 
 run_format() {
@@ -88,15 +108,20 @@ run_format() {
 	fi
 }
 
+build_sanitized() {
+	make --no-print-directory -j"$(nproc)" SAN=address,undefined programs unit replays
+}
+
 # The same programs built with sanitizers, in a process of its own whose last line is its count.
 run_sanitized() {
 	local log=$results/sanitized counts
 	echo "== again with SAN=address,undefined"
-	if make --no-print-directory -j"$(nproc)" SAN=address,undefined programs unit replays >"$log" 2>&1; then
+	if build_sanitized >"$log" 2>&1; then
 		SAN=address,undefined scripts/test.sh build/san-address-undefined 2>&1 | tee "$log" | sed '$d'
 	else
 		cat "$log"
 	fi
+	grep '^unsteady: ' "$log" | sed 's/$/ (with sanitizers)/' >>"$results/unsteady.again"
 	counts=$(sed -n '$s/^\([0-9]*\) passed, \([0-9]*\) failed$/\1 \2/p' "$log")
 	# shellcheck disable=SC2086
 	count ${counts:-0 1}
@@ -119,11 +144,14 @@ run_programs() {
 	run_replays
 }
 
-# Most of what goes over HTTP waits; the programs meanwhile compute. Their counts come from a process of their own.
+[ -n "$SAN" ] || [ "${STRATUS_QUICK:-0}" = 1 ] || sanitized=1
+
+# Most of what goes over HTTP waits; the programs meanwhile compute, then the compiler. Their counts come from a process of their own.
 (
 	passed=0 failed=0
 	run_programs
 	echo "$passed $failed" >"$results/programs"
+	[ -z "$sanitized" ] || build_sanitized >/dev/null
 ) >"$results/programs.log" 2>&1 &
 programs=$!
 if [ -n "$SAN" ]; then
@@ -137,7 +165,9 @@ wait $programs
 cat "$results/programs.log"
 # shellcheck disable=SC2046
 count $(cat "$results/programs" || echo 0 1)
-[ -n "$SAN" ] || [ "${STRATUS_QUICK:-0}" = 1 ] || run_sanitized
+run_again
+[ -z "$sanitized" ] || run_sanitized
 
+cat "$results/unsteady.again"
 echo "$passed passed, $failed failed"
 [ $failed = 0 ] && [ $passed -gt 0 ]

@@ -2,7 +2,7 @@
 #ifndef STRATUS_CLIENTS_COMMANDS_H
 #define STRATUS_CLIENTS_COMMANDS_H
 
-#include "clients/client.h"
+#include "clients/command.h"
 
 extern const struct command command_render;
 extern const struct command command_compare;

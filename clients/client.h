@@ -8,10 +8,11 @@
 
 enum client_exit {
 	CLIENT_OK = 0,
-	CLIENT_REFUSED = 1,     /* the server answered, and not with what was asked for */
-	CLIENT_USAGE = 2,       /* bad command line or unreadable input */
-	CLIENT_UNREACHABLE = 3, /* no connection, or it broke */
-	CLIENT_UNWRITABLE = 4,  /* the result could not be written */
+	CLIENT_REFUSED = 1,       /* the server answered, and not with what was asked for */
+	CLIENT_USAGE = 2,         /* bad command line or unreadable input */
+	CLIENT_UNREACHABLE = 3,   /* no connection, or it broke */
+	CLIENT_UNWRITABLE = 4,    /* the result could not be written */
+	CLIENT_INTERRUPTED = 130, /* by SIGINT or SIGTERM, where work that is kept was going on */
 };
 
 struct client {

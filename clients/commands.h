@@ -5,6 +5,7 @@
 #include "clients/command.h"
 
 extern const struct command command_render;
+extern const struct command command_batch;
 extern const struct command command_compare;
 extern const struct command command_asset;
 extern const struct command command_presets;

@@ -4,8 +4,9 @@
 
 #include <stdlib.h>
 
-const struct command *const commands[] = {&command_render, &command_compare, &command_asset,  &command_presets,
-					  &command_info,   &command_bench,   &command_health, NULL};
+const struct command *const commands[] = {&command_render, &command_batch,   &command_compare,
+					  &command_asset,  &command_presets, &command_info,
+					  &command_bench,  &command_health,  NULL};
 
 static void print_usage(FILE *to)
 {
@@ -15,7 +16,7 @@ static void print_usage(FILE *to)
 	fputs("\n  stratus COMMAND --help, stratus --version\n\n"
 	      "The daemon is at --server, else at STRATUS_SERVER, else at http://127.0.0.1:8080. Where it asks for a key: "
 	      "STRATUS_API_KEY.\n"
-	      "Exit status: 0 done, 1 refused by the server, 2 bad usage or input, 3 cannot connect, 4 cannot write.\n",
+	      "Exit status: 0 done, 1 refused by the server, 2 bad usage or input, 3 cannot connect, 4 cannot write, 130 interrupted.\n",
 	      to);
 }
 

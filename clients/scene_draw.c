@@ -1,4 +1,5 @@
 #include "clients/bench/draws.h"
+#include "clients/member_range.h"
 #include "clients/scene_edit.h"
 #include "clients/scene_list.h"
 
@@ -8,31 +9,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A value that nine digits tell exactly, so that what a manifest says is what was asked for. */
-static json_t *draw_number(double low, double high, double share)
-{
-	char text[32];
-	snprintf(text, sizeof text, "%.9g", low + share * (high - low));
-	return json_real(strtod(text, NULL));
-}
-
-/* "LOW..HIGH". NULL: it is none. */
+/* "member=LOW..HIGH". NULL: it is none. */
 static json_t *draw_range(const char *text, double share)
 {
-	const char *dots = strstr(text, "..");
-	char *low_text = dots ? strndup(text, (size_t)(dots - text)) : NULL;
-	json_t *low = low_text ? json_loads(low_text, JSON_DECODE_ANY, NULL) : NULL, *value = NULL;
-	json_t *high = dots ? json_loads(dots + 2, JSON_DECODE_ANY, NULL) : NULL;
-	if (json_is_integer(low) && json_is_integer(high) && json_integer_value(low) <= json_integer_value(high)) {
-		const double count = (double)(json_integer_value(high) - json_integer_value(low)) + 1;
-		value = json_integer(json_integer_value(low) + (json_int_t)floor(share * count));
-	} else if (json_is_number(low) && json_is_number(high) && json_number_value(low) <= json_number_value(high)) {
-		value = draw_number(json_number_value(low), json_number_value(high), share);
-	}
-	free(low_text);
-	json_decref(low);
-	json_decref(high);
-	return value;
+	struct member_range range;
+	if (!member_range_read(text, &range) || range.from > range.to)
+		return NULL;
+	return range.whole ? json_integer((json_int_t)(range.from + floor(share * (range.to - range.from + 1))))
+			   : member_range_at(&range, share);
 }
 
 /* "ONE,ANOTHER" */
@@ -61,7 +45,7 @@ static bool vary_member(json_t *scene, json_t *labels, const char *vary, struct 
 		return false;
 	}
 	const bool is_range = strstr(equals, "..") != NULL;
-	json_t *value = is_range ? draw_range(equals + 1, share) : draw_choice(equals + 1, share);
+	json_t *value = is_range ? draw_range(vary, share) : draw_choice(equals + 1, share);
 	char *text = value ? json_dumps(value, JSON_ENCODE_ANY | JSON_REAL_PRECISION(9)) : NULL, *assignment = NULL;
 	bool good = text && asprintf(&assignment, "%.*s=%s", (int)(equals - vary), vary, text) >= 0;
 	if (!value)

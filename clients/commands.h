@@ -8,6 +8,7 @@ extern const struct command command_render;
 extern const struct command command_batch;
 extern const struct command command_animate;
 extern const struct command command_sun;
+extern const struct command command_optics;
 extern const struct command command_compare;
 extern const struct command command_asset;
 extern const struct command command_presets;

@@ -4,9 +4,9 @@
 
 #include <stdlib.h>
 
-const struct command *const commands[] = {
-	&command_render, &command_batch, &command_animate, &command_sun, &command_compare, &command_asset, &command_presets,
-	&command_info,   &command_bench, &command_health,  NULL};
+const struct command *const commands[] = {&command_render, &command_batch,   &command_animate, &command_sun,
+					  &command_optics, &command_compare, &command_asset,   &command_presets,
+					  &command_info,   &command_bench,   &command_health,  NULL};
 
 static void print_usage(FILE *to)
 {

@@ -190,9 +190,11 @@ static int run_asset(struct client *client, void *given, char **words)
 	return is_complete(action, options) ? action->run(client, options) : CLIENT_USAGE;
 }
 
-static const struct option_row rows[] = {FLAG_ROW("new", 0, struct asset_options, only_new, "put: only when there is none of this name"),
-					 TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct asset_options, output, "get: where to"),
-					 {0}};
+static const struct option_row rows[] = {
+	FLAG_ROW("new", 0, struct asset_options, only_new, "put: only when there is none of this name"),
+	TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct asset_options, output, "get: where to"),
+	{0},
+};
 
 const struct command command_asset = {
 	.name = "asset",

@@ -188,7 +188,9 @@ static int run_compare(struct client *client, void *given, char **words)
 		return CLIENT_USAGE;
 	int status = compose_body(client, options, &body);
 	if (status == CLIENT_OK)
-		status = http_send(client, &(struct http_request){.path = "/v1/compare", .json = body, .accept = form->accept}, &response);
+		status = http_send(client,
+				   &(struct http_request){.path = "/v1/compare", .json = body, .accept = form->accept, .shows_time = true},
+				   &response);
 	if (status == CLIENT_OK)
 		status = save_answer(client, options, &response);
 	if (status == CLIENT_OK)

@@ -28,7 +28,9 @@ static int run_health(struct client *client, void *given, char **words)
 }
 
 static const struct option_row rows[] = {
-	FLAG_ROW("ready", 0, struct health_options, ready, "ask whether it can render, too (/readyz instead of /healthz)"), {0}};
+	FLAG_ROW("ready", 0, struct health_options, ready, "ask whether it can render, too (/readyz instead of /healthz)"),
+	{0},
+};
 
 const struct command command_health = {
 	.name = "health",

@@ -1,9 +1,13 @@
 #include "clients/http.h"
 
+#include "clients/clock.h"
+
 #include <curl/curl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { CONNECT_SECONDS = 10, GRACE_MS = 2000 }; /* grace: the daemon's own 504 says more than a broken connection */
 
@@ -18,6 +22,8 @@ struct http_exchange {
 	struct curl_slist *headers;
 	struct body body;
 	char message[CURL_ERROR_SIZE];
+	double begin_s, timeout_s; /* for show_time */
+	bool shown;
 };
 
 static size_t append_body(char *data, size_t one, size_t count, void *context)
@@ -180,6 +186,37 @@ void http_exchange_destroy(struct http_exchange *exchange)
 	free(exchange);
 }
 
+enum { SHOWN_AFTER_S = 1 };
+
+/* Called by libcurl some times a second. */
+static int show_time(void *context, curl_off_t total, curl_off_t now, curl_off_t upload_total, curl_off_t upload_now)
+{
+	struct http_exchange *exchange = context;
+	const double seconds = clock_s() - exchange->begin_s;
+	(void)total;
+	(void)upload_total;
+	(void)upload_now;
+	if (seconds < SHOWN_AFTER_S)
+		return 0;
+	exchange->shown = true;
+	fprintf(stderr, "\r\033[K%s, %.0f s", now > 0 ? "receiving" : "rendering", floor(seconds));
+	if (exchange->timeout_s > 0)
+		fprintf(stderr, " of at most %.0f s", exchange->timeout_s);
+	fflush(stderr);
+	return 0;
+}
+
+static void begin_show(struct http_exchange *exchange, const struct client *client)
+{
+	if (client->quiet || !isatty(STDERR_FILENO))
+		return;
+	exchange->begin_s = clock_s();
+	exchange->timeout_s = client->timeout_s;
+	curl_easy_setopt(exchange->curl, CURLOPT_XFERINFOFUNCTION, show_time);
+	curl_easy_setopt(exchange->curl, CURLOPT_XFERINFODATA, exchange);
+	curl_easy_setopt(exchange->curl, CURLOPT_NOPROGRESS, 0L);
+}
+
 int http_send(const struct client *client, const struct http_request *request, struct http_response *response)
 {
 	struct http_exchange *exchange = http_exchange_create(client, request);
@@ -187,7 +224,11 @@ int http_send(const struct client *client, const struct http_request *request, s
 	*response = (struct http_response){0};
 	if (!exchange)
 		return CLIENT_UNREACHABLE;
+	if (request->shows_time)
+		begin_show(exchange, client);
 	const CURLcode code = curl_easy_perform(exchange->curl);
+	if (exchange->shown)
+		fputs("\r\033[K", stderr);
 	if (code != CURLE_OK) {
 		client_error("%s: %s", exchange->url, http_exchange_error(exchange, code));
 	} else {

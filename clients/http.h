@@ -16,6 +16,7 @@ struct http_request {
 	bool remove;        /* DELETE */
 	const char *header; /* one more, whole, or NULL */
 	const char *accept; /* header, whole; NULL: anything */
+	bool shows_time;    /* by http_send: on a terminal, once it takes longer than a second, how long it has taken */
 };
 
 struct http_response {

@@ -110,7 +110,8 @@ static const struct option_row rows[] = {
 	FLAG_ROW("scene", 0, struct info_options, scene,
 		 "print the scene in it, as JSON: stratus info --scene sky.exr | stratus render - -o again.exr"),
 	FLAG_ROW("json", 0, struct info_options, json, "print everything as JSON"),
-	{0}};
+	{0},
+};
 
 const struct command command_info = {
 	.name = "info",

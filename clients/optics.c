@@ -101,7 +101,8 @@ static const struct option_row rows[] = {
 	TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct optics_options, output, "draw it into a .png or .svg (by gnuplot)"),
 	FLAG_ROW("json", 0, struct optics_options, json, "print the daemon's answer, the whole phase function"),
 	SCENE_SOURCE_ROWS(struct optics_options, source),
-	{0}};
+	{0},
+};
 
 const struct command command_optics = {
 	.name = "optics",

@@ -6,6 +6,7 @@
 #include "clients/scene_edit.h"
 #include "clients/scene_source.h"
 #include "clients/timing.h"
+#include "clients/watch.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,6 +16,7 @@
 struct render_options {
 	struct scene_source source;
 	const char *output;
+	bool watch;
 };
 
 static bool is_complete(const struct render_options *options)
@@ -23,6 +25,8 @@ static bool is_complete(const struct render_options *options)
 		client_error("render wants -o FILE, or -o - for standard output");
 	else if (strcmp(options->output, "-") == 0 && isatty(STDOUT_FILENO))
 		client_error("an image is no text for a terminal; redirect standard output or name a file");
+	else if (options->watch && (!options->source.file || strcmp(options->source.file, "-") == 0 || strcmp(options->output, "-") == 0))
+		client_error("--watch wants a scene in a file, and a file for the image");
 	else
 		return true;
 	return false;
@@ -61,16 +65,13 @@ static int save_answer(const struct client *client, const char *output, const st
 	return CLIENT_OK;
 }
 
-static int run_render(struct client *client, void *given, char **words)
+static int render(const struct client *client, const struct render_options *options)
 {
-	struct render_options *options = given;
 	struct http_response response = {0};
 	char *body = NULL;
-	if (!scene_source_take(&options->source, words[0]) || !is_complete(options))
-		return CLIENT_USAGE;
 	int status = compose_scene(client, options, &body);
 	if (status == CLIENT_OK)
-		status = http_send(client, &(struct http_request){.path = "/v1/render", .json = body}, &response);
+		status = http_send(client, &(struct http_request){.path = "/v1/render", .json = body, .shows_time = true}, &response);
 	if (status == CLIENT_OK)
 		status = save_answer(client, options->output, &response);
 	http_response_finish(&response);
@@ -78,10 +79,35 @@ static int run_render(struct client *client, void *given, char **words)
 	return status;
 }
 
-static const struct option_row rows[] = {TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct render_options, output,
-						  "the image; .png or .exr chooses the format unless the scene does; - is standard output"),
-					 SCENE_SOURCE_ROWS(struct render_options, source),
-					 {0}};
+/* Goes on until it is interrupted: a scene that is wrong now may be right when it is saved again. */
+__attribute__((noreturn)) static void render_again_and_again(const struct client *client, const struct render_options *options)
+{
+	struct watch watch;
+	for (;;) {
+		watch_begin(&watch, options->source.file);
+		render(client, options);
+		if (!client->quiet)
+			fprintf(stderr, "waiting for %s to change\n", options->source.file);
+		watch_await(&watch);
+	}
+}
+
+static int run_render(struct client *client, void *given, char **words)
+{
+	struct render_options *options = given;
+	if (!scene_source_take(&options->source, words[0]) || !is_complete(options))
+		return CLIENT_USAGE;
+	if (options->watch)
+		render_again_and_again(client, options);
+	return render(client, options);
+}
+
+static const struct option_row rows[] = {
+	TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct render_options, output,
+		 "the image; .png or .exr chooses the format unless the scene does; - is standard output"),
+	FLAG_ROW("watch", 0, struct render_options, watch, "render again whenever the scene's file is saved, until interrupted"),
+	SCENE_SOURCE_ROWS(struct render_options, source),
+	{0}};
 
 const struct command command_render = {
 	.name = "render",

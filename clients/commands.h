@@ -15,5 +15,6 @@ extern const struct command command_presets;
 extern const struct command command_health;
 extern const struct command command_info;
 extern const struct command command_bench;
+extern const struct command command_completion;
 
 #endif

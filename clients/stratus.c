@@ -4,15 +4,16 @@
 
 #include <stdlib.h>
 
-const struct command *const commands[] = {&command_render, &command_batch,   &command_animate, &command_sun,
-					  &command_optics, &command_compare, &command_asset,   &command_presets,
-					  &command_info,   &command_bench,   &command_health,  NULL};
+const struct command *const commands[] = {
+	&command_render, &command_batch, &command_animate, &command_compare, &command_presets,    &command_sun, &command_optics,
+	&command_asset,  &command_info,  &command_bench,   &command_health,  &command_completion, NULL,
+};
 
 static void print_usage(FILE *to)
 {
 	fputs("usage: stratus [--server URL] [--key KEY] [--ca-cert FILE] COMMAND [options]\n\n", to);
 	for (int i = 0; commands[i]; i++)
-		fprintf(to, "  %-10s %s\n", commands[i]->name, commands[i]->summary);
+		fprintf(to, "  %-11s %s\n", commands[i]->name, commands[i]->summary);
 	fputs("\n  stratus COMMAND --help, stratus --version\n\n"
 	      "The daemon is at --server, else at STRATUS_SERVER, else at http://127.0.0.1:8080. Where it asks for a key: "
 	      "STRATUS_API_KEY.\n"

@@ -1,7 +1,10 @@
 /* stratus bench: a load on the daemon, and how it bears it. */
 #include "clients/bench/report.h"
+#include "clients/bench/run_compare.h"
+#include "clients/bench/sweep.h"
 #include "clients/commands.h"
 #include "clients/output_file.h"
+#include "clients/plot.h"
 #include "clients/scene_source.h"
 
 #include <stdio.h>
@@ -13,6 +16,10 @@ enum { OPEN_CONNECTIONS = 1024, CLOSED_CONNECTIONS = 4, CONNECTIONS_MAX = 65536 
 struct bench_options {
 	struct scene_source source;
 	const char *mix, *path, *json;
+	const char *plot; /* of a sweep */
+	const char *old;  /* a run that another is compared with */
+	bool sweep;
+	double p99_ms;
 	struct load_settings load;
 };
 
@@ -23,7 +30,11 @@ static bool is_complete(const struct bench_options *options)
 		client_error("bench takes a scene, --mix or --get, one of them");
 	else if (options->path && (*options->path != '/' || strpbrk(options->path, " \r\n")))
 		client_error("--get wants a path, such as /healthz");
-	else if (options->load.random_arrivals && options->load.rate <= 0)
+	else if ((options->plot || options->p99_ms > 0) && !options->sweep)
+		client_error("--plot and --within-ms belong to --sweep");
+	else if (options->plot && !plot_is_named(options->plot))
+		client_error("figures are .png or .svg, not %s", options->plot);
+	else if (options->load.random_arrivals && options->load.rate <= 0 && !options->sweep)
 		client_error("--random is for an open load, by --rate: in a closed one each client asks when it was answered");
 	else
 		return true;
@@ -44,42 +55,70 @@ static int make_mix(const struct client *client, const struct bench_options *opt
 	return status;
 }
 
-/* Figures as JSON into a file, or tables for people on standard output. */
-static int tell(const struct client *client, const struct bench_options *options, const struct mix *mix, const struct load_result *result)
+/* Takes the reference of an object, NULL too. */
+static int write_json(const char *path, json_t *object)
 {
-	if (!options->json || (!client->quiet && strcmp(options->json, "-") != 0))
-		report_print(stdout, &options->load, mix, result);
-	if (!options->json)
-		return CLIENT_OK;
-	json_t *report = report_json(&options->load, mix, result);
-	char *text = report ? json_dumps(report, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) : NULL;
-	const bool written = text && output_file_write(options->json, text, strlen(text));
+	char *text = object ? json_dumps(object, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) : NULL;
+	const bool written = text && output_file_write(path, text, strlen(text));
 	if (!text)
 		client_error("out of memory");
 	free(text);
-	json_decref(report);
+	json_decref(object);
 	return written ? CLIENT_OK : CLIENT_UNWRITABLE;
+}
+
+/* Are tables wanted on standard output? */
+static bool is_for_people(const struct client *client, const struct bench_options *options)
+{
+	return !options->json || (!client->quiet && strcmp(options->json, "-") != 0);
+}
+
+static int run_once(const struct client *client, const struct bench_options *options, struct mix *mix)
+{
+	struct load_result result = {0};
+	int status = load_run(client, mix, &options->load, &result);
+	if (status == CLIENT_OK && is_for_people(client, options))
+		report_print(stdout, &options->load, mix, &result);
+	if (status == CLIENT_OK && options->json)
+		status = write_json(options->json, report_json(&options->load, mix, &result));
+	if (status == CLIENT_OK && histogram_count(result.good) == 0)
+		status = CLIENT_REFUSED;
+	load_result_finish(&result);
+	return status;
+}
+
+static int run_sweep(const struct client *client, const struct bench_options *options, struct mix *mix)
+{
+	const struct sweep_settings settings = {.load = options->load, .p99_ms = options->p99_ms};
+	struct sweep sweep;
+	int status = sweep_run(client, mix, &settings, &sweep);
+	if (status == CLIENT_OK && is_for_people(client, options))
+		sweep_print(stdout, &sweep);
+	if (status == CLIENT_OK && options->json)
+		status = write_json(options->json, sweep_json(&sweep));
+	if (status == CLIENT_OK && options->plot)
+		status = sweep_draw(&sweep, options->plot);
+	sweep_finish(&sweep);
+	return status;
 }
 
 static int run_bench(struct client *client, void *given, char **words)
 {
 	struct bench_options *options = given;
-	struct load_result result = {0};
 	struct mix *mix = NULL;
+	if (options->old && !words[0])
+		client_error("--compare OLD.json wants the new run behind it: NEW.json");
+	if (options->old)
+		return words[0] ? run_compare(options->old, words[0], options->json && strcmp(options->json, "-") == 0) : CLIENT_USAGE;
 	if (!scene_source_take(&options->source, words[0]) || !is_complete(options))
 		return CLIENT_USAGE;
 	if (options->load.connections == 0)
-		options->load.connections = options->load.rate > 0 ? OPEN_CONNECTIONS : CLOSED_CONNECTIONS;
+		options->load.connections = options->load.rate > 0 || options->sweep ? OPEN_CONNECTIONS : CLOSED_CONNECTIONS;
 	if (client->timeout_s > 0)
 		options->load.timeout_s = client->timeout_s + 1; /* the daemon's answer that it was too late should still be heard */
 	int status = make_mix(client, options, &mix);
 	if (status == CLIENT_OK)
-		status = load_run(client, mix, &options->load, &result);
-	if (status == CLIENT_OK)
-		status = tell(client, options, mix, &result);
-	if (status == CLIENT_OK && histogram_count(result.good) == 0)
-		status = CLIENT_REFUSED;
-	load_result_finish(&result);
+		status = options->sweep ? run_sweep(client, options, mix) : run_once(client, options, mix);
 	mix_destroy(mix);
 	return status;
 }
@@ -97,6 +136,14 @@ static const struct option_row rows[] = {
 	TEXT_ROW("get", 0, "PATH", WORDS_ANY, struct bench_options, path, "fetch a path instead of a scene"),
 	SCENE_SOURCE_ROWS(struct bench_options, source),
 	NUMBER_ROW("seed", "N", 0, 4294967295.0, struct bench_options, load.seed, "of what is drawn at random (1)"),
+	FLAG_ROW("sweep", 0, struct bench_options, sweep,
+		 "loads at rising rates, from --rate or a quarter of what four clients get, up to the knee: the last that is borne"),
+	NUMBER_ROW("within-ms", "MS", 0.001, 1e6, struct bench_options, p99_ms,
+		   "of a sweep: a 99th percentile that is longer is not borne"),
+	TEXT_ROW("plot", 0, "FILE", WORDS_FILE, struct bench_options, plot,
+		 "of a sweep: latencies and answers over the rate as .png or .svg"),
+	TEXT_ROW("compare", 0, "OLD.json", WORDS_FILE, struct bench_options, old,
+		 "no load: holds a run, NEW.json, against another, with intervals; --json - prints JSON"),
 	TEXT_ROW("json", 0, "FILE", WORDS_FILE, struct bench_options, json,
 		 "the figures as JSON as well; - is standard output, instead of the tables"),
 	{0}};
@@ -105,7 +152,7 @@ static const struct bench_options defaults = {.load = {.duration_s = 10, .warm_u
 
 const struct command command_bench = {
 	.name = "bench",
-	.arguments = "[SCENE.json|-]",
+	.arguments = "[SCENE.json|-|NEW.json]",
 	.summary = "put a load on the daemon and measure its answers",
 	.remarks =
 		"With --rate requests go out at fixed times, whatever the answers, and latencies count from those times: a daemon that\n"

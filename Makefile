@@ -33,7 +33,7 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
 	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr openssl clang-format procps \
-	python3-prometheus-client mandoc systemd
+	python3-prometheus-client mandoc systemd ffmpeg
 VALIDATE_PACKAGES := gnuplot-nox
 GALLERY_PACKAGES := imagemagick
 FUZZ_PACKAGES := clang llvm
@@ -181,9 +181,10 @@ PREFIX ?= /usr/local
 SYSCONFDIR ?= /etc/stratus
 UNITDIR ?= $(PREFIX)/lib/systemd/system
 MANDIR = $(PREFIX)/share/man
+COMPLETIONDIR = $(PREFIX)/share/bash-completion/completions
 INSTALLED = $(PREFIX)/bin/stratusd $(PREFIX)/bin/stratus $(PREFIX)/lib/stratus/stratus-image.so \
 	$(addprefix $(PREFIX)/share/stratus/,mie.kernel grafana-dashboard.json prometheus-alerts.yml) \
-	$(MANDIR)/man8/stratusd.8 $(MANDIR)/man1/stratus.1 $(UNITDIR)/stratusd.service
+	$(MANDIR)/man8/stratusd.8 $(MANDIR)/man1/stratus.1 $(COMPLETIONDIR)/stratus $(UNITDIR)/stratusd.service
 
 # The operator's settings are left as they are, by uninstall too.
 install: all man
@@ -193,6 +194,7 @@ install: all man
 	install -m 644 build/mie.kernel ops/grafana-dashboard.json ops/prometheus-alerts.yml $(DESTDIR)$(PREFIX)/share/stratus
 	install -m 644 $(B)/stratusd.8 $(DESTDIR)$(MANDIR)/man8
 	install -m 644 $(B)/stratus.1 $(DESTDIR)$(MANDIR)/man1
+	$(B)/stratus completion bash | install -m 644 /dev/stdin $(DESTDIR)$(COMPLETIONDIR)/stratus
 	sed 's|@BINDIR@|$(PREFIX)/bin|; s|@SYSCONFDIR@|$(SYSCONFDIR)|' ops/stratusd.service | \
 		install -m 644 /dev/stdin $(DESTDIR)$(UNITDIR)/stratusd.service
 	test -e $(DESTDIR)$(SYSCONFDIR)/stratusd.env || install -m 640 ops/stratusd.env $(DESTDIR)$(SYSCONFDIR)/stratusd.env

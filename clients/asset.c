@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { NEW = 'n', NAME_LENGTH_MAX = 63 };
+enum { NAME_LENGTH_MAX = 63, WORDS_MAX = 3 };
 
 struct asset_options {
 	const char *output; /* of get */
@@ -180,35 +180,32 @@ static bool is_complete(const struct action *action, const struct asset_options 
 	return false;
 }
 
-static int run_asset(struct client *client, int argc, char **argv)
+static int run_asset(struct client *client, void *given, char **words)
 {
-	static const struct option table[] = {
-		{"output", required_argument, NULL, 'o'}, {"new", no_argument, NULL, NEW}, CLIENT_LONG_OPTIONS, {0}};
-	struct asset_options options = {0};
-	for (int option; (option = getopt_long(argc, argv, "o:" CLIENT_SHORT_OPTIONS, table, NULL)) != -1;) {
-		if (option == 'o') {
-			options.output = optarg;
-		} else if (option == NEW) {
-			options.only_new = true;
-		} else {
-			const int end = client_option(client, option);
-			if (end >= 0)
-				return end;
-		}
-	}
-	const struct action *action = find_action(argv[optind]);
-	options.words = argv + optind + 1;
-	options.word_count = argc - optind - 1;
-	return is_complete(action, &options) ? action->run(client, &options) : CLIENT_USAGE;
+	struct asset_options *options = given;
+	const struct action *action = find_action(words[0]);
+	options->words = words + (words[0] != NULL);
+	while (options->words[options->word_count])
+		options->word_count++;
+	return is_complete(action, options) ? action->run(client, options) : CLIENT_USAGE;
 }
+
+static const struct option_row rows[] = {
+	FLAG_ROW("new", 0, struct asset_options, only_new, "put: only when there is none of this name"),
+	TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct asset_options, output, "get: where to"),
+	{0},
+};
 
 const struct command command_asset = {
 	.name = "asset",
 	.arguments = "put NAME FILE | list | get NAME -o FILE | delete NAME",
 	.summary = "upload, list, fetch and delete maps for clouds and ground",
-	.help = "A scene names a map as clouds.map (thickness, 0 to 1 of thickness_m) or ground.map (reflectance).\n"
-		"FILE is a PNG or an EXR, - standard input or output. With -q the list has names alone.\n\n"
-		"  --new              put: only when there is none of this name\n"
-		"  -o, --output FILE  get: where to\n",
+	.remarks = "A scene names a map as clouds.map (thickness, 0 to 1 of thickness_m) or ground.map (reflectance).\n"
+		   "FILE is a PNG or an EXR, - standard input or output. With -q the list has names alone.\n",
+	.options = rows,
+	.size = sizeof(struct asset_options),
+	.words_max = WORDS_MAX,
+	.words = WORDS_FILE,
+	.choices = "put list get delete",
 	.run = run_asset,
 };

@@ -1,9 +1,18 @@
 #include "clients/client.h"
 
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
+
+const struct option_row client_options[] = {
+	TEXT_ROW("server", 0, "URL", WORDS_ANY, struct client, server, "of the daemon (STRATUS_SERVER, else http://127.0.0.1:8080)"),
+	TEXT_ROW("key", 0, "KEY", WORDS_ANY, struct client, key,
+		 "to show to the daemon (better in STRATUS_API_KEY: others on this machine may see options)"),
+	TEXT_ROW("ca-cert", 0, "FILE", WORDS_FILE, struct client, ca_cert,
+		 "authorities that may vouch for the daemon of an https address (STRATUS_CA_CERT, else the system's)"),
+	NUMBER_ROW("timeout", "SECONDS", 0.001, 3600, struct client, timeout_s, "give up, here and in the daemon, after so long"),
+	FLAG_ROW("quiet", 'q', struct client, quiet, "errors alone on standard error"),
+	FLAG_ROW("help", 'h', struct client, help, "this text"),
+	{0}};
 
 void client_error(const char *format, ...)
 {
@@ -13,55 +22,4 @@ void client_error(const char *format, ...)
 	vfprintf(stderr, format, args);
 	fputc('\n', stderr);
 	va_end(args);
-}
-
-void client_help(const struct command *command)
-{
-	printf("usage: stratus %s [options]%s%s\n\n%s.\n\n%s", command->name, *command->arguments ? " " : "", command->arguments,
-	       command->summary, command->help);
-	fputs("  --server URL       of the daemon (STRATUS_SERVER, else http://127.0.0.1:8080)\n"
-	      "  --key KEY          to show to the daemon (better in STRATUS_API_KEY: others on this machine may see options)\n"
-	      "  --ca-cert FILE     authorities that may vouch for the daemon of an https address (STRATUS_CA_CERT, else the system's)\n"
-	      "  --timeout SECONDS  give up, here and in the daemon, after so long\n"
-	      "  -q, --quiet        errors alone on standard error\n"
-	      "  -h, --help         this text\n",
-	      stdout);
-}
-
-static int set_timeout(struct client *client, const char *text)
-{
-	char *end;
-	const double seconds = strtod(text, &end);
-	if (end == text || *end || !(seconds >= 0.001 && seconds <= 3600)) { /* the daemon takes no more */
-		client_error("--timeout wants seconds, 0.001 to 3600, not \"%s\"", text);
-		return CLIENT_USAGE;
-	}
-	client->timeout_s = seconds;
-	return -1;
-}
-
-int client_option(struct client *client, int option)
-{
-	switch (option) {
-	case 'S':
-		client->server = optarg;
-		return -1;
-	case 'K':
-		client->key = optarg;
-		return -1;
-	case 'C':
-		client->ca_cert = optarg;
-		return -1;
-	case 'T':
-		return set_timeout(client, optarg);
-	case 'q':
-		client->quiet = true;
-		return -1;
-	case 'h':
-		client_help(client->command);
-		return CLIENT_OK;
-	default:
-		fprintf(stderr, "stratus %s --help lists the options\n", client->command->name);
-		return CLIENT_USAGE;
-	}
 }

@@ -15,14 +15,12 @@
 #include <strings.h>
 #include <unistd.h>
 
-enum { PRESET = 'p', SET = 's', WITH = 'w', AND = 'a', NAMED = 'n', AGAINST = 'r', REGION = 'g' };
-
 struct compare_options {
 	struct scene_source source;
 	const char *output; /* NULL: the table alone */
-	json_t *variants;   /* the scene as it is, and those of --with */
+	json_t *variants;   /* the scene as it is, and those of --with; NULL until there is one */
 	const char *against;
-	json_t *regions; /* empty: the daemon's */
+	struct text_list regions; /* empty: the daemon's */
 };
 
 static const struct form {
@@ -45,96 +43,86 @@ static const struct form *form_of(const char *output)
 
 /* --- the command line ------------------------------------------------------------------------------------------------------------- */
 
+/* The variants, of which the scene as it is is the first. NULL: out of memory. */
+static json_t *variants_of(struct compare_options *options)
+{
+	if (!options->variants)
+		options->variants = json_pack("[{}]");
+	return options->variants;
+}
+
 /* The variant that the options before speak of. */
-static json_t *last_variant(const struct compare_options *options)
+static json_t *last_variant(struct compare_options *options)
 {
-	return json_array_get(options->variants, json_array_size(options->variants) - 1);
+	json_t *variants = variants_of(options);
+	return json_array_get(variants, json_array_size(variants) - 1);
 }
 
-/* false after a message */
-static bool take_option(struct compare_options *options, int option, const char *value)
+static bool take_with(void *options, const char *value)
 {
-	switch (option) {
-	case PRESET:
-		options->source.preset = value;
-		return true;
-	case SET:
-		options->source.sets[options->source.set_count++] = value;
-		return true;
-	case WITH:
-		json_array_append_new(options->variants, json_object());
+	json_array_append_new(variants_of(options), json_object());
+	return scene_set(last_variant(options), value);
+}
+
+static bool take_and(void *options, const char *value)
+{
+	if (json_array_size(variants_of(options)) > 1)
 		return scene_set(last_variant(options), value);
-	case AND:
-		if (json_array_size(options->variants) > 1)
-			return scene_set(last_variant(options), value);
-		client_error("--and adds to a --with, and there is none before it");
-		return false;
-	case NAMED:
-		return json_object_set_new(last_variant(options), "name", json_string(value)) == 0;
-	case AGAINST:
-		options->against = value;
-		return true;
-	case REGION:
-		return json_array_append_new(options->regions, json_string(value)) == 0;
-	default:
-		options->output = value;
-		return true;
-	}
-}
-
-static bool is_complete(const struct compare_options *options, int words)
-{
-	if (words > 1 || (options->source.file && options->source.preset))
-		client_error("compare takes one scene: a file, - or a preset");
-	else if (!form_of(options->output))
-		client_error("compare writes .json, .png or .exr, not %s", options->output);
-	else
-		return true;
+	client_error("--and adds to a --with, and there is none before it");
 	return false;
 }
 
-/* Negative: go on; else the exit status. */
-static int read_options(struct client *client, struct compare_options *options, int argc, char **argv)
+static bool take_name(void *options, const char *value)
 {
-	static const struct option table[] = {{"preset", required_argument, NULL, PRESET},
-					      {"set", required_argument, NULL, SET},
-					      {"with", required_argument, NULL, WITH},
-					      {"and", required_argument, NULL, AND},
-					      {"named", required_argument, NULL, NAMED},
-					      {"against", required_argument, NULL, AGAINST},
-					      {"region", required_argument, NULL, REGION},
-					      {"output", required_argument, NULL, 'o'},
-					      CLIENT_LONG_OPTIONS,
-					      {0}};
-	static const int own[] = {PRESET, SET, WITH, AND, NAMED, AGAINST, REGION, 'o'};
-	for (int option; (option = getopt_long(argc, argv, "o:" CLIENT_SHORT_OPTIONS, table, NULL)) != -1;) {
-		bool is_own = false;
-		for (size_t i = 0; i < sizeof own / sizeof *own; i++)
-			is_own |= own[i] == option;
-		const int end = is_own ? (take_option(options, option, optarg) ? -1 : CLIENT_USAGE) : client_option(client, option);
-		if (end >= 0)
-			return end;
-	}
-	options->source.file = argv[optind];
-	return is_complete(options, argc - optind) ? -1 : CLIENT_USAGE;
+	if (json_object_set_new(last_variant(options), "name", json_string(value)) == 0)
+		return true;
+	client_error("--named wants a name in UTF-8");
+	return false;
 }
+
+static void finish_options(void *given)
+{
+	struct compare_options *options = given;
+	json_decref(options->variants);
+}
+
+static const struct option_row rows[] = {
+	TAKE_ROW("with", "member=value", WORDS_MEMBER, take_with, "a variant: model.shading=paper, radiosity.enabled=false; up to three"),
+	TAKE_ROW("and", "member=value", WORDS_MEMBER, take_and, "changes the variant further; repeatable"),
+	TAKE_ROW("named", "NAME", WORDS_ANY, take_name,
+		 "names the variant before it, or the scene as it is; else the table says how the daemon calls it: paper, or by what it "
+		 "changes, radiosity-enabled-false"),
+	TEXT_ROW("against", 0, "NAME", WORDS_ANY, struct compare_options, against, "the one that the others are compared with"),
+	LIST_ROW("region", "NAME", WORDS_ANY, struct compare_options, regions,
+		 "all, cloud, sky or ground; repeatable; all four unless given"),
+	TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct compare_options, output,
+		 ".json figures, .png pictures and maps of their differences, .exr the same to work with; - is figures on standard output"),
+	SCENE_SOURCE_ROWS(struct compare_options, source),
+	{0}};
 
 /* --- asking ------------------------------------------------------------------------------------------------------------------------- */
 
 /* The request's body, malloc'd into *body. */
-static int compose_body(const struct client *client, const struct compare_options *options, char **body)
+static int compose_body(const struct client *client, struct compare_options *options, char **body)
 {
 	json_t *scene, *root;
+	if (!last_variant(options)) {
+		client_error("out of memory");
+		return CLIENT_USAGE;
+	}
 	int status = scene_source_load(client, &options->source, &scene);
 	if (status != CLIENT_OK)
 		return status;
 	if (json_array_size(options->variants) == 1)
 		json_array_append_new(options->variants, json_pack("{s:{s:s}}", "model", "name", "reference"));
 	root = json_pack("{s:o, s:O}", "scene", scene, "variants", options->variants);
+	json_t *regions = options->regions.count ? json_array() : NULL;
+	for (int i = 0; i < options->regions.count; i++)
+		json_array_append_new(regions, json_string(options->regions.text[i]));
 	if (options->against)
 		json_object_set_new(root, "reference", json_string(options->against));
-	if (json_array_size(options->regions) > 0)
-		json_object_set(root, "regions", options->regions);
+	if (regions)
+		json_object_set_new(root, "regions", regions);
 	*body = root ? json_dumps(root, JSON_COMPACT) : NULL;
 	json_decref(root);
 	if (!*body)
@@ -188,28 +176,27 @@ static void print_timings(const struct client *client, const struct http_respons
 	timing_print(stderr, &table, response->seconds * 1000, response->size);
 }
 
-static int run_compare(struct client *client, int argc, char **argv)
+static int run_compare(struct client *client, void *given, char **words)
 {
-	const char **sets = calloc((size_t)argc, sizeof *sets);
-	struct compare_options options = {.source.sets = sets, .variants = json_pack("[{}]"), .regions = json_array()};
+	struct compare_options *options = given;
+	const struct form *form = form_of(options->output);
 	struct http_response response = {0};
 	char *body = NULL;
-	int status = sets && options.variants && options.regions ? read_options(client, &options, argc, argv) : CLIENT_USAGE;
-	if (status < 0)
-		status = compose_body(client, &options, &body);
-	if (status == CLIENT_OK && body)
+	if (!form)
+		client_error("compare writes .json, .png or .exr, not %s", options->output);
+	if (!form || !scene_source_take(&options->source, words[0]))
+		return CLIENT_USAGE;
+	int status = compose_body(client, options, &body);
+	if (status == CLIENT_OK)
 		status = http_send(client,
-				   &(struct http_request){.path = "/v1/compare", .json = body, .accept = form_of(options.output)->accept},
+				   &(struct http_request){.path = "/v1/compare", .json = body, .accept = form->accept, .shows_time = true},
 				   &response);
-	if (status == CLIENT_OK && body)
-		status = save_answer(client, &options, &response);
-	if (status == CLIENT_OK && body)
+	if (status == CLIENT_OK)
+		status = save_answer(client, options, &response);
+	if (status == CLIENT_OK)
 		print_timings(client, &response);
 	http_response_finish(&response);
 	free(body);
-	json_decref(options.variants);
-	json_decref(options.regions);
-	free(sets);
 	return status;
 }
 
@@ -217,22 +204,16 @@ const struct command command_compare = {
 	.name = "compare",
 	.arguments = "[SCENE.json|-]",
 	.summary = "hold a scene against variants of itself",
-	.help = "The scene as it is and each --with are rendered and compared: with the model reference where one is, else with the "
-		"scene.\n"
-		"Without --with the scene is compared with its reference. The table gives percents of the reference's mean light:\n"
-		"bias and its standard error, root mean square difference, what of that is noise and what is left without it; and FLIP, "
-		"what an\n"
-		"observer notices (0 to 1). Timings go to standard error.\n\n"
-		"  --with member=value   a variant: model.shading=paper, radiosity.enabled=false; up to three\n"
-		"  --and member=value    changes the variant further; repeatable\n"
-		"  --named NAME          names the variant before it, or the scene as it is; else the table says how the daemon calls it:\n"
-		"                        paper, or by what it changes, radiosity-enabled-false\n"
-		"  --against NAME        the one that the others are compared with\n"
-		"  --region NAME         all, cloud, sky or ground; repeatable; all four unless given\n"
-		"  -o, --output FILE     .json figures, .png pictures and maps of their differences, .exr the same to work with; - is "
-		"figures on\n"
-		"                        standard output\n"
-		"  --preset NAME         start from one of the daemon's scenes\n"
-		"  --set member=value    change the scene, for all variants; repeatable\n",
+	.remarks = "The scene as it is and each --with are rendered and compared: with the model reference where one is, else with the "
+		   "scene.\n"
+		   "Without --with the scene is compared with its reference. The table gives percents of the reference's mean light: bias "
+		   "and\n"
+		   "its standard error, root mean square difference, what of that is noise and what is left without it; and FLIP, what an\n"
+		   "observer notices (0 to 1). Timings go to standard error.\n",
+	.options = rows,
+	.size = sizeof(struct compare_options),
+	.words_max = 1,
+	.words = WORDS_FILE,
 	.run = run_compare,
+	.finish = finish_options,
 };

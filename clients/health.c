@@ -4,25 +4,20 @@
 
 #include <stdio.h>
 
-enum { READY = 'r', HEALTH_SECONDS = 5 };
+enum { HEALTH_SECONDS = 5 };
 
-static int run_health(struct client *client, int argc, char **argv)
+struct health_options {
+	bool ready;
+};
+
+static int run_health(struct client *client, void *given, char **words)
 {
-	static const struct option options[] = {{"ready", no_argument, NULL, READY}, CLIENT_LONG_OPTIONS, {0}};
-	struct http_request request = {.path = "/healthz"};
-	for (int option; (option = getopt_long(argc, argv, CLIENT_SHORT_OPTIONS, options, NULL)) != -1;) {
-		if (option == READY) {
-			request.path = "/readyz";
-			continue;
-		}
-		const int end = client_option(client, option);
-		if (end >= 0)
-			return end;
-	}
+	const struct health_options *options = given;
+	const struct http_request request = {.path = options->ready ? "/readyz" : "/healthz"};
+	struct http_response response;
+	(void)words;
 	if (client->timeout_s <= 0)
 		client->timeout_s = HEALTH_SECONDS;
-
-	struct http_response response;
 	int status = http_send(client, &request, &response);
 	if (status == CLIENT_OK && response.status != 200)
 		status = CLIENT_REFUSED;
@@ -32,10 +27,16 @@ static int run_health(struct client *client, int argc, char **argv)
 	return status;
 }
 
+static const struct option_row rows[] = {
+	FLAG_ROW("ready", 0, struct health_options, ready, "ask whether it can render, too (/readyz instead of /healthz)"),
+	{0},
+};
+
 const struct command command_health = {
 	.name = "health",
 	.arguments = "",
 	.summary = "ask whether the daemon is well (exit status 0) or not",
-	.help = "  --ready            ask whether it can render, too (/readyz instead of /healthz)\n",
+	.options = rows,
+	.size = sizeof(struct health_options),
 	.run = run_health,
 };

@@ -1,15 +1,29 @@
 #include "clients/http.h"
 
+#include "clients/clock.h"
+
 #include <curl/curl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { CONNECT_SECONDS = 10, GRACE_MS = 2000 }; /* grace: the daemon's own 504 says more than a broken connection */
 
 struct body {
 	char *data;
 	size_t size, room;
+};
+
+struct http_exchange {
+	CURL *curl;
+	char *url;
+	struct curl_slist *headers;
+	struct body body;
+	char message[CURL_ERROR_SIZE];
+	double begin_s, timeout_s; /* for show_time */
+	bool shown;
 };
 
 static size_t append_body(char *data, size_t one, size_t count, void *context)
@@ -112,6 +126,9 @@ static bool take_answer(CURL *curl, struct body *body, struct http_response *res
 {
 	curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &response->status);
 	curl_easy_getinfo(curl, CURLINFO_TOTAL_TIME, &response->seconds);
+	curl_off_t retry_after_s = 0;
+	curl_easy_getinfo(curl, CURLINFO_RETRY_AFTER, &retry_after_s);
+	response->retry_after_s = (double)retry_after_s;
 	response->content_type = join_header(curl, "Content-Type");
 	response->server_timing = join_header(curl, "Server-Timing");
 	response->request_id = join_header(curl, "X-Request-Id");
@@ -121,40 +138,105 @@ static bool take_answer(CURL *curl, struct body *body, struct http_response *res
 	return response->content_type && response->server_timing && response->request_id && response->body;
 }
 
+struct http_exchange *http_exchange_create(const struct client *client, const struct http_request *request)
+{
+	struct http_exchange *exchange = calloc(1, sizeof *exchange);
+	if (exchange) {
+		exchange->curl = curl_easy_init();
+		exchange->url = join_url(client, request->path);
+		exchange->headers = request_headers(client, request);
+	}
+	if (!exchange || !exchange->curl || !exchange->url || !exchange->headers) {
+		client_error("out of memory");
+		http_exchange_destroy(exchange);
+		return NULL;
+	}
+	set_options(exchange->curl, client, request);
+	curl_easy_setopt(exchange->curl, CURLOPT_URL, exchange->url);
+	curl_easy_setopt(exchange->curl, CURLOPT_HTTPHEADER, exchange->headers);
+	curl_easy_setopt(exchange->curl, CURLOPT_WRITEDATA, &exchange->body);
+	curl_easy_setopt(exchange->curl, CURLOPT_ERRORBUFFER, exchange->message);
+	return exchange;
+}
+
+void *http_exchange_handle(struct http_exchange *exchange)
+{
+	return exchange->curl;
+}
+
+bool http_exchange_answer(struct http_exchange *exchange, struct http_response *response)
+{
+	*response = (struct http_response){0};
+	return take_answer(exchange->curl, &exchange->body, response);
+}
+
+const char *http_exchange_error(const struct http_exchange *exchange, int code)
+{
+	return *exchange->message ? exchange->message : curl_easy_strerror((CURLcode)code);
+}
+
+void http_exchange_destroy(struct http_exchange *exchange)
+{
+	if (!exchange)
+		return;
+	free(exchange->body.data);
+	curl_slist_free_all(exchange->headers);
+	free(exchange->url);
+	curl_easy_cleanup(exchange->curl);
+	free(exchange);
+}
+
+enum { SHOWN_AFTER_S = 1 };
+
+/* Called by libcurl some times a second. */
+static int show_time(void *context, curl_off_t total, curl_off_t now, curl_off_t upload_total, curl_off_t upload_now)
+{
+	struct http_exchange *exchange = context;
+	const double seconds = clock_s() - exchange->begin_s;
+	(void)total;
+	(void)upload_total;
+	(void)upload_now;
+	if (seconds < SHOWN_AFTER_S)
+		return 0;
+	exchange->shown = true;
+	fprintf(stderr, "\r\033[K%s, %.0f s", now > 0 ? "receiving" : "rendering", floor(seconds));
+	if (exchange->timeout_s > 0)
+		fprintf(stderr, " of at most %.0f s", exchange->timeout_s);
+	fflush(stderr);
+	return 0;
+}
+
+static void begin_show(struct http_exchange *exchange, const struct client *client)
+{
+	if (client->quiet || !isatty(STDERR_FILENO))
+		return;
+	exchange->begin_s = clock_s();
+	exchange->timeout_s = client->timeout_s;
+	curl_easy_setopt(exchange->curl, CURLOPT_XFERINFOFUNCTION, show_time);
+	curl_easy_setopt(exchange->curl, CURLOPT_XFERINFODATA, exchange);
+	curl_easy_setopt(exchange->curl, CURLOPT_NOPROGRESS, 0L);
+}
+
 int http_send(const struct client *client, const struct http_request *request, struct http_response *response)
 {
-	struct body body = {0};
-	char message[CURL_ERROR_SIZE] = "";
-	CURL *curl = curl_easy_init();
-	char *url = join_url(client, request->path);
-	struct curl_slist *headers = request_headers(client, request);
+	struct http_exchange *exchange = http_exchange_create(client, request);
 	bool done = false;
-
 	*response = (struct http_response){0};
-	if (!curl || !url || !headers) {
-		client_error("out of memory");
-		goto cleanup;
-	}
-	set_options(curl, client, request);
-	curl_easy_setopt(curl, CURLOPT_URL, url);
-	curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers);
-	curl_easy_setopt(curl, CURLOPT_WRITEDATA, &body);
-	curl_easy_setopt(curl, CURLOPT_ERRORBUFFER, message);
-
-	const CURLcode code = curl_easy_perform(curl);
+	if (!exchange)
+		return CLIENT_UNREACHABLE;
+	if (request->shows_time)
+		begin_show(exchange, client);
+	const CURLcode code = curl_easy_perform(exchange->curl);
+	if (exchange->shown)
+		fputs("\r\033[K", stderr);
 	if (code != CURLE_OK) {
-		client_error("%s: %s", url, *message ? message : curl_easy_strerror(code));
-		goto cleanup;
+		client_error("%s: %s", exchange->url, http_exchange_error(exchange, code));
+	} else {
+		done = http_exchange_answer(exchange, response);
+		if (!done)
+			client_error("out of memory");
 	}
-	done = take_answer(curl, &body, response);
-	if (!done)
-		client_error("out of memory");
-
-cleanup:
-	free(body.data);
-	curl_slist_free_all(headers);
-	free(url);
-	curl_easy_cleanup(curl);
+	http_exchange_destroy(exchange);
 	return done ? CLIENT_OK : CLIENT_UNREACHABLE;
 }
 

@@ -5,7 +5,10 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { AS_SCENE = 's', AS_JSON = 'j' };
+struct info_options {
+	bool scene, json;
+};
+
 enum { NAME_WIDTH = 32 };
 
 /* Files may hold anything; a terminal gets no control characters from them. */
@@ -78,52 +81,47 @@ static void print_text(json_t *info)
 	}
 }
 
-static int print(json_t *info, int form, const char *path)
+static int print(json_t *info, const struct info_options *options, const char *path)
 {
 	const json_t *scene = json_object_get(info, "scene");
-	if (form == AS_SCENE && !scene) {
+	if (options->scene && !scene) {
 		client_error("%s: holds no scene", path);
 		return CLIENT_USAGE;
 	}
-	if (form == AS_SCENE)
+	if (options->scene)
 		puts(scene_text(info));
-	else if (form == AS_JSON)
+	else if (options->json)
 		print_json(info);
 	else
 		print_text(info);
 	return fflush(stdout) == 0 && !ferror(stdout) ? CLIENT_OK : CLIENT_UNWRITABLE;
 }
 
-static int run_info(struct client *client, int argc, char **argv)
+static int run_info(struct client *client, void *options, char **words)
 {
-	static const struct option options[] = {
-		{"scene", no_argument, NULL, AS_SCENE}, {"json", no_argument, NULL, AS_JSON}, CLIENT_LONG_OPTIONS, {0}};
-	int form = 0;
-	for (int option; (option = getopt_long(argc, argv, CLIENT_SHORT_OPTIONS, options, NULL)) != -1;) {
-		if (option == AS_SCENE || option == AS_JSON) {
-			form = option;
-			continue;
-		}
-		const int end = client_option(client, option);
-		if (end >= 0)
-			return end;
-	}
-	if (argc - optind != 1) {
-		client_error("info takes one image file");
-		return CLIENT_USAGE;
-	}
-	json_t *info = image_info_read(argv[optind]);
-	const int status = info ? print(info, form, argv[optind]) : CLIENT_USAGE;
+	(void)client;
+	json_t *info = image_info_read(words[0]);
+	const int status = info ? print(info, options, words[0]) : CLIENT_USAGE;
 	json_decref(info);
 	return status;
 }
+
+static const struct option_row rows[] = {
+	FLAG_ROW("scene", 0, struct info_options, scene,
+		 "print the scene in it, as JSON: stratus info --scene sky.exr | stratus render - -o again.exr"),
+	FLAG_ROW("json", 0, struct info_options, json, "print everything as JSON"),
+	{0},
+};
 
 const struct command command_info = {
 	.name = "info",
 	.arguments = "FILE",
 	.summary = "tell what an image file says of itself",
-	.help = "Reads the header alone, and asks no daemon.\n\n"
-		"  --scene  print the scene in it, as JSON: stratus info --scene sky.exr | stratus render - -o again.exr\n"
-		"  --json   print everything as JSON\n",
+	.remarks = "Reads the header alone, and asks no daemon.\n",
+	.options = rows,
+	.size = sizeof(struct info_options),
+	.words_min = 1,
+	.words_max = 1,
+	.words = WORDS_FILE,
 	.run = run_info,
 };

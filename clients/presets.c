@@ -34,23 +34,13 @@ static int print_scene(const json_t *presets, const char *name)
 	return fflush(stdout) == 0 ? CLIENT_OK : CLIENT_UNWRITABLE;
 }
 
-static int run_presets(struct client *client, int argc, char **argv)
+static int run_presets(struct client *client, void *options, char **words)
 {
-	static const struct option options[] = {CLIENT_LONG_OPTIONS, {0}};
-	for (int option; (option = getopt_long(argc, argv, CLIENT_SHORT_OPTIONS, options, NULL)) != -1;) {
-		const int end = client_option(client, option);
-		if (end >= 0)
-			return end;
-	}
-	if (argc - optind > 1) {
-		client_error("presets takes one name at most");
-		return CLIENT_USAGE;
-	}
-
 	json_t *presets;
+	(void)options;
 	int status = preset_list_fetch(client, &presets);
 	if (status == CLIENT_OK)
-		status = argv[optind] ? print_scene(presets, argv[optind]) : print_list(client, presets);
+		status = words[0] ? print_scene(presets, words[0]) : print_list(client, presets);
 	json_decref(presets);
 	return status;
 }
@@ -59,6 +49,8 @@ const struct command command_presets = {
 	.name = "presets",
 	.arguments = "[NAME]",
 	.summary = "list the daemon's scenes, or print one",
-	.help = "With -q the names stand alone.\n\n",
+	.remarks = "With -q the names stand alone.\n",
+	.words_max = 1,
+	.words = WORDS_PRESET,
 	.run = run_presets,
 };

@@ -6,6 +6,7 @@
 #include "clients/scene_edit.h"
 #include "clients/scene_source.h"
 #include "clients/timing.h"
+#include "clients/watch.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,41 +16,20 @@
 struct render_options {
 	struct scene_source source;
 	const char *output;
+	bool watch;
 };
 
-enum { PRESET = 'p', SET = 's' };
-
-/* Negative: go on; else the exit status. options->source.sets has room for argc texts. */
-static int read_options(struct client *client, struct render_options *options, int argc, char **argv)
+static bool is_complete(const struct render_options *options)
 {
-	static const struct option table[] = {{"preset", required_argument, NULL, PRESET},
-					      {"set", required_argument, NULL, SET},
-					      {"output", required_argument, NULL, 'o'},
-					      CLIENT_LONG_OPTIONS,
-					      {0}};
-	for (int option; (option = getopt_long(argc, argv, "o:" CLIENT_SHORT_OPTIONS, table, NULL)) != -1;) {
-		if (option == PRESET) {
-			options->source.preset = optarg;
-		} else if (option == SET) {
-			options->source.sets[options->source.set_count++] = optarg;
-		} else if (option == 'o') {
-			options->output = optarg;
-		} else {
-			const int end = client_option(client, option);
-			if (end >= 0)
-				return end;
-		}
-	}
-	options->source.file = argv[optind];
-	if (argc - optind > 1 || (options->source.file && options->source.preset))
-		client_error("render takes one scene: a file, - or a preset");
-	else if (!options->output)
+	if (!options->output)
 		client_error("render wants -o FILE, or -o - for standard output");
 	else if (strcmp(options->output, "-") == 0 && isatty(STDOUT_FILENO))
 		client_error("an image is no text for a terminal; redirect standard output or name a file");
+	else if (options->watch && (!options->source.file || strcmp(options->source.file, "-") == 0 || strcmp(options->output, "-") == 0))
+		client_error("--watch wants a scene in a file, and a file for the image");
 	else
-		return -1;
-	return CLIENT_USAGE;
+		return true;
+	return false;
 }
 
 /* The request's body, malloc'd into *body. */
@@ -85,37 +65,58 @@ static int save_answer(const struct client *client, const char *output, const st
 	return CLIENT_OK;
 }
 
-static int run_render(struct client *client, int argc, char **argv)
+static int render(const struct client *client, const struct render_options *options)
 {
-	const char **sets = calloc((size_t)argc, sizeof *sets);
-	struct render_options options = {.source.sets = sets};
 	struct http_response response = {0};
 	char *body = NULL;
-	int status = CLIENT_USAGE;
-	if (!sets)
-		goto cleanup;
-	status = read_options(client, &options, argc, argv);
-	if (status >= 0)
-		goto cleanup;
-	status = compose_scene(client, &options, &body);
+	int status = compose_scene(client, options, &body);
 	if (status == CLIENT_OK)
-		status = http_send(client, &(struct http_request){.path = "/v1/render", .json = body}, &response);
+		status = http_send(client, &(struct http_request){.path = "/v1/render", .json = body, .shows_time = true}, &response);
 	if (status == CLIENT_OK)
-		status = save_answer(client, options.output, &response);
-cleanup:
+		status = save_answer(client, options->output, &response);
 	http_response_finish(&response);
 	free(body);
-	free(sets);
 	return status;
 }
+
+/* Goes on until it is interrupted: a scene that is wrong now may be right when it is saved again. */
+__attribute__((noreturn)) static void render_again_and_again(const struct client *client, const struct render_options *options)
+{
+	struct watch watch;
+	for (;;) {
+		watch_begin(&watch, options->source.file);
+		render(client, options);
+		if (!client->quiet)
+			fprintf(stderr, "waiting for %s to change\n", options->source.file);
+		watch_await(&watch);
+	}
+}
+
+static int run_render(struct client *client, void *given, char **words)
+{
+	struct render_options *options = given;
+	if (!scene_source_take(&options->source, words[0]) || !is_complete(options))
+		return CLIENT_USAGE;
+	if (options->watch)
+		render_again_and_again(client, options);
+	return render(client, options);
+}
+
+static const struct option_row rows[] = {
+	TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct render_options, output,
+		 "the image; .png or .exr chooses the format unless the scene does; - is standard output"),
+	FLAG_ROW("watch", 0, struct render_options, watch, "render again whenever the scene's file is saved, until interrupted"),
+	SCENE_SOURCE_ROWS(struct render_options, source),
+	{0}};
 
 const struct command command_render = {
 	.name = "render",
 	.arguments = "[SCENE.json|-]",
 	.summary = "render a scene into a PNG or EXR file",
-	.help = "Without a scene the daemon's default sky is rendered. Timings go to standard error.\n\n"
-		"  -o, --output FILE  the image; .png or .exr chooses the format unless the scene does; - is standard output\n"
-		"  --preset NAME      start from one of the daemon's scenes\n"
-		"  --set member=value change the scene: sun.elevation_deg=10, camera.position_m=[0,0,3000]; repeatable\n",
+	.remarks = "Without a scene the daemon's default sky is rendered. Timings go to standard error.\n",
+	.options = rows,
+	.size = sizeof(struct render_options),
+	.words_max = 1,
+	.words = WORDS_FILE,
 	.run = run_render,
 };

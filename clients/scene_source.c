@@ -15,6 +15,14 @@ static int take_preset(const struct client *client, const char *name, json_t **s
 	return status;
 }
 
+bool scene_source_take(struct scene_source *source, const char *file)
+{
+	source->file = file;
+	if (file && source->preset)
+		client_error("one scene is wanted: a file, - or a preset");
+	return !file || !source->preset;
+}
+
 int scene_source_load(const struct client *client, const struct scene_source *source, json_t **scene)
 {
 	int status = CLIENT_OK;
@@ -25,8 +33,8 @@ int scene_source_load(const struct client *client, const struct scene_source *so
 		*scene = source->file ? scene_read(source->file) : json_object();
 	if (status == CLIENT_OK && !*scene)
 		status = CLIENT_USAGE;
-	for (int i = 0; status == CLIENT_OK && i < source->set_count; i++)
-		if (!scene_set(*scene, source->sets[i]))
+	for (int i = 0; status == CLIENT_OK && i < source->sets.count; i++)
+		if (!scene_set(*scene, source->sets.text[i]))
 			status = CLIENT_USAGE;
 	if (status != CLIENT_OK) {
 		json_decref(*scene);

@@ -28,7 +28,7 @@ command_section() {
 	local help
 	help=$("$program" "$1" --help | escape)
 	echo ".Ss $(sed -n '1s/^usage: //p' <<<"$help")"
-	sed '1,2d' <<<"$help" | items | awk '
+	sed '1,2d' <<<"$help" | items | sed -E 's/^ {8,}//' | awk '
 		/^\.It / && !list { print ".Bl -tag -width Ds"; list = 1 }
 		/^$/ { gap = 1; next }
 		gap && !/^\.It / && shown { print ".Pp" }

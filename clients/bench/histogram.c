@@ -82,3 +82,15 @@ double histogram_deviation(const struct histogram *histogram)
 	const double variance = histogram->total ? histogram->sum_of_squares / (double)histogram->total - mean * mean : 0;
 	return variance > 0 ? sqrt(variance) : 0;
 }
+
+bool histogram_next(const struct histogram *histogram, int *bucket, int64_t *value_ns, uint64_t *count)
+{
+	while (*bucket < BUCKETS && histogram->count[*bucket] == 0)
+		(*bucket)++;
+	if (*bucket == BUCKETS)
+		return false;
+	const int64_t last = last_of_bucket(*bucket);
+	*value_ns = last < histogram->largest ? last : histogram->largest;
+	*count = histogram->count[(*bucket)++];
+	return true;
+}

@@ -4,6 +4,7 @@
 #ifndef STRATUS_CLIENTS_BENCH_HISTOGRAM_H
 #define STRATUS_CLIENTS_BENCH_HISTOGRAM_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct histogram;
@@ -23,5 +24,9 @@ int64_t histogram_at(const struct histogram *histogram, double share);
 /* Exactly. 0 when empty. */
 double histogram_mean(const struct histogram *histogram);
 double histogram_deviation(const struct histogram *histogram);
+
+/* The next bucket that holds values, from *bucket on, which starts at 0 and is moved behind it; false when there is none. value_ns: the
+ * largest that it takes. */
+bool histogram_next(const struct histogram *histogram, int *bucket, int64_t *value_ns, uint64_t *count);
 
 #endif

@@ -345,8 +345,8 @@ static bool create_load(struct load *load, const struct client *client)
 		return false;
 	for (int i = load->settings->connections; i > 0; i--)
 		load->closed[load->closed_count++] = i - 1;
-	load->gaps = draws_begin(load->settings->seed + 1);
-	return mix_prepare(load->mix, load->address.host, headers, load->settings->seed) &&
+	load->gaps = draws_begin((uint64_t)load->settings->seed + 1);
+	return mix_prepare(load->mix, load->address.host, headers, (uint64_t)load->settings->seed) &&
 	       create_result(load->result, mix_kind_count(load->mix));
 }
 

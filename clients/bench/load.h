@@ -31,7 +31,7 @@ struct load_settings {
 	double warm_up_s;     /* asked before, and not measured */
 	double duration_s;
 	double timeout_s; /* a request without an answer so long after it was due is given up */
-	uint64_t seed;
+	double seed;      /* a whole number */
 };
 
 /* A stage of the daemon, as its Server-Timing names it. */

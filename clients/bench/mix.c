@@ -27,18 +27,28 @@ struct mix {
 	struct draws draws;
 };
 
+/* Lets go what mix_prepare made. */
+static void finish_preparation(struct mix *mix)
+{
+	for (int i = 0; i < mix->count; i++) {
+		free(mix->kind[i].bytes);
+		mix->kind[i].bytes = NULL;
+	}
+	free(mix->host);
+	free(mix->headers);
+	mix->host = mix->headers = NULL;
+}
+
 void mix_destroy(struct mix *mix)
 {
 	if (!mix)
 		return;
 	for (int i = 0; i < mix->count; i++) {
 		free(mix->kind[i].path);
-		free(mix->kind[i].bytes);
 		json_decref(mix->kind[i].scene);
 		json_decref(mix->kind[i].vary);
 	}
-	free(mix->host);
-	free(mix->headers);
+	finish_preparation(mix);
 	free(mix);
 }
 
@@ -238,6 +248,7 @@ static bool write_post(const struct mix *mix, const json_t *scene, char **bytes,
 
 bool mix_prepare(struct mix *mix, const char *host, const char *headers, uint64_t seed)
 {
+	finish_preparation(mix);
 	mix->host = strdup(host);
 	mix->headers = strdup(headers);
 	mix->draws = draws_begin(seed);

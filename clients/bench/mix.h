@@ -36,8 +36,8 @@ struct mix *mix_of_path(const char *path);
 /* Takes NULL. */
 void mix_destroy(struct mix *mix);
 
-/* Before the first draw: the Host that requests name, more header lines (each with its CRLF, or ""), and where the draws begin. false when
- * out of memory. */
+/* Before the first draw of a load: the Host that requests name, more header lines (each with its CRLF, or ""), and where the draws begin.
+ * false when out of memory. */
 bool mix_prepare(struct mix *mix, const char *host, const char *headers, uint64_t seed);
 
 int mix_kind_count(const struct mix *mix);

@@ -98,6 +98,17 @@ void report_print(FILE *to, const struct load_settings *settings, const struct m
 
 /* --- for programs -------------------------------------------------------------------------------------------------------------------- */
 
+/* [nanoseconds, how many up to them and above the ones before] */
+static json_t *histogram_json(const struct histogram *histogram)
+{
+	json_t *buckets = json_array();
+	int64_t value_ns;
+	uint64_t count;
+	for (int bucket = 0; histogram_next(histogram, &bucket, &value_ns, &count);)
+		json_array_append_new(buckets, json_pack("[I, I]", (json_int_t)value_ns, (json_int_t)count));
+	return buckets;
+}
+
 static json_t *latency_json(const struct histogram *histogram)
 {
 	const uint64_t count = histogram_count(histogram);
@@ -111,6 +122,7 @@ static json_t *latency_json(const struct histogram *histogram)
 		snprintf(name, sizeof name, "%s_s", columns[i].name);
 		json_object_set_new(object, name, json_real((double)histogram_at(histogram, columns[i].share) * 1e-9));
 	}
+	json_object_set_new(object, "histogram", histogram_json(histogram));
 	return object;
 }
 

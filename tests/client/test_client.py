@@ -356,3 +356,73 @@ def test_asset_delete(server):
     server.reply = problem
     assert stratus(server, "asset", "delete", "a").returncode == 1
     assert b"put NAME FILE" in stratus(server, "asset", "--help").stdout
+
+
+def test_watch_renders_again_when_the_scene_is_saved(server, tmp_path):
+    scene, image_path = tmp_path / "scene.json", tmp_path / "a.png"
+    scene.write_text('{"sun": {"elevation_deg": 1}}')
+    environment = {**os.environ, "STRATUS_SERVER": f"http://127.0.0.1:{server.server_port}"}
+    command = [BUILD / "stratus", "render", "--watch", scene, "-o", image_path]
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+    try:
+
+        def save(text):  # as editors do: at once
+            (tmp_path / "new").write_text(text)
+            os.replace(tmp_path / "new", scene)
+
+        def await_line(words):
+            for line in process.stderr:
+                if words in line:
+                    return
+            raise AssertionError(f"it ended before it said {words}")
+
+        await_line("waiting")
+        assert image_path.read_bytes() == IMAGE
+        save("{")
+        await_line("scene.json: line 1")
+        await_line("waiting")
+        save('{"sun": {"elevation_deg": 2}}')
+        await_line("waiting")
+        assert [request.body["sun"]["elevation_deg"] for request in server.seen] == [1, 2]
+        server.reply = problem
+        save('{"sun": {"elevation_deg": 300}}')
+        await_line("422")
+        await_line("waiting")
+        assert process.poll() is None
+    finally:
+        process.terminate()
+        process.wait(60)
+        process.stderr.close()
+
+
+@pytest.mark.parametrize("arguments", [["-o", "a.png"], ["-", "-o", "a.png"], ["s.json", "-o", "-"]])
+def test_watch_wants_files(server, tmp_path, arguments):
+    assert stratus(server, "render", "--watch", *arguments, cwd=tmp_path).returncode == 2
+    assert not server.seen
+
+
+def test_a_long_render_says_how_long_on_a_terminal(server, tmp_path):
+    held = threading.Event()
+
+    def late(handler):
+        held.wait(60)
+        image(handler)
+
+    server.reply = late
+    ours, theirs = os.openpty()
+    environment = {**os.environ, "STRATUS_SERVER": f"http://127.0.0.1:{server.server_port}"}
+    command = [BUILD / "stratus", "render", "-o", tmp_path / "a.png", "--timeout", "600"]
+    process = subprocess.Popen(command, env=environment, stderr=theirs)
+    os.close(theirs)
+    text = b""
+    while b"rendering, 1 s of at most 600 s" not in text:
+        text += os.read(ours, 4096)
+    held.set()
+    assert process.wait(60) == 0
+    while True:
+        try:
+            text += os.read(ours, 4096)
+        except OSError:  # how a terminal ends
+            break
+    os.close(ours)
+    assert b"\r\x1b[Kstage" in text

@@ -42,6 +42,7 @@ FILES = {
     "share/stratus/prometheus-alerts.yml": 0o644,
     "share/man/man8/stratusd.8": 0o644,
     "share/man/man1/stratus.1": 0o644,
+    "share/bash-completion/completions/stratus": 0o644,
     "etc/stratusd.env": 0o640,
 }
 

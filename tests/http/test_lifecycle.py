@@ -33,15 +33,6 @@ def test_full_queue(start_faulty):
     assert daemon.metric("stratus_queue_depth") == 0
 
 
-def test_probes_answer_while_rendering(start_faulty):
-    """And they do not wait for it: the renderer stands still."""
-    daemon = start_faulty("--queue-length", "16")
-    with daemon.busy():
-        for _ in range(20):
-            assert daemon.get("/healthz").status == 200
-            assert daemon.get("/readyz").status == 200
-
-
 def test_shutdown_finishes_accepted_work(start_faulty):
     daemon = start_faulty()
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
@@ -67,11 +58,15 @@ def test_shutdown_when_idle_is_quick(start_daemon):
 
 
 def test_clients_that_leave(start_faulty):
-    """Their renders are dropped, and the daemon goes on."""
+    """Their renders are dropped, and the daemon goes on. Meanwhile probes do not wait for the renderer, which stands still."""
     daemon = start_faulty("--queue-length", "32")
     with daemon.holding():
         for client in [send(daemon, {"clouds": {"seed": i}, "output": SMALL}) for i in range(12)]:
             client.close()
+        assert wait_for(daemon.is_held)
+        for _ in range(20):
+            assert daemon.get("/healthz").status == 200
+            assert daemon.get("/readyz").status == 200
     assert wait_for(lambda: daemon.metric('stratus_renders_ended_total{reason="abandoned"}') == 12)
     daemon.settle()
     assert daemon.render({"output": {"width": 32, "height": 32}}).status == 200
@@ -148,8 +143,7 @@ def test_help_and_version():
     assert run("--version").stdout.startswith("stratus ")
 
 
-def test_address_in_use(start_daemon, tmp_path):
-    daemon = start_daemon()
+def test_address_in_use(daemon, tmp_path):
     result = run("--listen", f"127.0.0.1:{daemon.port}", "--state-dir", str(tmp_path), STRATUS_KERNEL=str(BUILD / "mie.kernel"))
     assert result.returncode == 1
     assert "--listen" in result.stderr

@@ -316,7 +316,7 @@ def test_layers_count_apart(guarded, keys):
 
 
 def run(*flags):
-    return subprocess.run([BUILD / "stratusd", "--listen=127.0.0.1:0", *flags], capture_output=True, text=True, timeout=120)
+    return subprocess.run([BUILD / "stratusd", "--listen=127.0.0.1:0", *flags], capture_output=True, text=True, timeout=300)
 
 
 @pytest.mark.parametrize("listen", ["0.0.0.0:0", "[::]:0", "192.0.2.1:80"])
@@ -373,7 +373,7 @@ def make_certificate(folder, name, *more):
     cert, key = folder / f"{name}.pem", folder / f"{name}.key"
     command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", f"/CN={name}"]
     command += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out", cert, *more]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
     key.chmod(0o600)
     return str(cert), str(key)
 
@@ -469,7 +469,7 @@ def test_client_that_leaves_is_noticed_over_tls(secure):
 def stratus(daemon, *arguments, **environment):
     clean = {name: value for name, value in os.environ.items() if not name.startswith("STRATUS_")}
     command = [BUILD / "stratus", "--server", f"https://127.0.0.1:{daemon.port}", *arguments]
-    return subprocess.run(command, env={**clean, **environment}, capture_output=True, text=True, timeout=120)
+    return subprocess.run(command, env={**clean, **environment}, capture_output=True, text=True, timeout=300)
 
 
 def test_client_over_tls_with_a_key(secure, keys, tmp_path):

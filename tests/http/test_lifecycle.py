@@ -5,10 +5,11 @@ import os
 import signal
 import socket
 import subprocess
+import time
 
 import pytest
 
-from conftest import BUILD, send, wait_for
+from conftest import BUILD, in_some_try, send, wait_for
 
 SMALL = {"width": 64, "height": 48}
 
@@ -48,22 +49,28 @@ def test_shutdown_finishes_accepted_work(start_faulty):
 
 
 def test_shutdown_when_idle_is_quick(start_daemon):
-    daemon = start_daemon()
-    idle = daemon.connect()
-    idle.request("GET", "/healthz")
-    idle.getresponse().read()
-    daemon.process.send_signal(signal.SIGINT)
-    assert daemon.process.wait(timeout=30) == 0
-    idle.close()
+    """A connection that rests, which would be closed after 30 s, is not waited for."""
+
+    def is_quick():
+        daemon = start_daemon()
+        idle = daemon.connect()
+        idle.request("GET", "/healthz")
+        idle.getresponse().read()
+        begin = time.monotonic()
+        daemon.process.send_signal(signal.SIGINT)
+        assert daemon.process.wait(timeout=180) == 0
+        idle.close()
+        return time.monotonic() - begin < 25
+
+    assert in_some_try(is_quick)
 
 
 def test_clients_that_leave(start_faulty):
     """Their renders are dropped, and the daemon goes on. Meanwhile probes do not wait for the renderer, which stands still."""
     daemon = start_faulty("--queue-length", "32")
-    with daemon.holding():
+    with daemon.busy():
         for client in [send(daemon, {"clouds": {"seed": i}, "output": SMALL}) for i in range(12)]:
             client.close()
-        assert wait_for(daemon.is_held)
         for _ in range(20):
             assert daemon.get("/healthz").status == 200
             assert daemon.get("/readyz").status == 200

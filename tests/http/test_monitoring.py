@@ -11,8 +11,9 @@ import pytest
 import yaml
 from prometheus_client.openmetrics.parser import text_string_to_metric_families
 
-from conftest import ROOT
+from conftest import ROOT, measures
 
+pytestmark = measures
 OPS = ROOT / "ops"
 SMALL = {"output": {"width": 32, "height": 24}}
 # What a scraper adds of its own.

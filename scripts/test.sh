@@ -43,7 +43,7 @@ run_unit() {
 	count "${ok:-0}" "${bad:-0}"
 }
 
-# What measures light for minutes runs code that others run as well: left out with sanitizers, under which it takes longer still.
+# What measures light for minutes runs code that others run as well: left out with sanitizers, under which it takes longer still, to build too.
 measures=" deck reference_layer reference_twin renderer_coverage renderer_fields renderer_model renderer_motion renderer_panoramas renderer_repeat
 	renderer_sides shaders_picture sky_light slab slab_photons "
 
@@ -109,7 +109,7 @@ run_format() {
 }
 
 build_sanitized() {
-	make --no-print-directory -j"$(nproc)" SAN=address,undefined programs unit replays
+	make --no-print-directory -j"$(nproc)" SAN=address,undefined WITHOUT="$measures" programs unit replays
 }
 
 # The same programs built with sanitizers, in a process of its own whose last line is its count.

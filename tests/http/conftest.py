@@ -27,6 +27,8 @@ BUILD = (ROOT / os.environ.get("STRATUS_BUILD", "build")).resolve()
 KERNEL = ROOT / "build" / "mie.kernel"
 SANITIZED = "san-" in str(BUILD) or bool(os.environ.get("SAN"))
 ANSWER_SECONDS = 300
+# As scripts/test.sh has it for programs: what measures light, by code that other tests run as well.
+measures = pytest.mark.skipif(SANITIZED, reason="the plain programs show it, and sanitizers find nothing that they do not find elsewhere")
 
 
 class Answer:

@@ -158,7 +158,7 @@ def test_what_needs_none(guarded):
 
 def test_refused_before_the_body(guarded):
     """A stranger's upload costs nothing: the answer comes before a byte of it is sent."""
-    with socket.create_connection(("127.0.0.1", guarded.port), timeout=60) as client:
+    with socket.create_connection(("127.0.0.1", guarded.port), timeout=180) as client:
         client.sendall(b"PUT /v1/assets/big HTTP/1.1\r\nHost: x\r\nContent-Length: 60000000\r\nExpect: 100-continue\r\n\r\n")
         assert client.recv(4096).startswith(b"HTTP/1.1 401 ")
     incoming = guarded.log.parent / "state" / "assets" / "incoming"
@@ -316,7 +316,7 @@ def test_layers_count_apart(guarded, keys):
 
 
 def run(*flags):
-    return subprocess.run([BUILD / "stratusd", "--listen=127.0.0.1:0", *flags], capture_output=True, text=True, timeout=120)
+    return subprocess.run([BUILD / "stratusd", "--listen=127.0.0.1:0", *flags], capture_output=True, text=True, timeout=300)
 
 
 @pytest.mark.parametrize("listen", ["0.0.0.0:0", "[::]:0", "192.0.2.1:80"])
@@ -360,7 +360,7 @@ def test_faults_of_settings(tmp_path):
 
 def test_names_of_new_keys():
     for name in ("", "a b", "a/b", "x" * 33, "anonymous"):
-        made = subprocess.run([BUILD / "stratusd", "--new-key", name], capture_output=True, text=True, timeout=60)
+        made = subprocess.run([BUILD / "stratusd", "--new-key", name], capture_output=True, text=True, timeout=180)
         assert made.returncode == 2 and made.stdout == ""
     assert subprocess.run([BUILD / "stratusd", "--new-key"], capture_output=True, timeout=180).returncode == 2
 
@@ -373,7 +373,7 @@ def make_certificate(folder, name, *more):
     cert, key = folder / f"{name}.pem", folder / f"{name}.key"
     command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", f"/CN={name}"]
     command += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out", cert, *more]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
     key.chmod(0o600)
     return str(cert), str(key)
 
@@ -431,7 +431,7 @@ def test_versions_of_tls(secure):
     for version in (ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3):
         context = ssl.create_default_context(cafile=secure.ca)
         context.minimum_version = context.maximum_version = version
-        with context.wrap_socket(socket.create_connection(("127.0.0.1", secure.port), timeout=60), server_hostname="127.0.0.1") as client:
+        with context.wrap_socket(socket.create_connection(("127.0.0.1", secure.port), timeout=180), server_hostname="127.0.0.1") as client:
             assert client.version() == {ssl.TLSVersion.TLSv1_2: "TLSv1.2", ssl.TLSVersion.TLSv1_3: "TLSv1.3"}[version]
             assert client.cipher()[2] >= 128 and "RSA" != client.cipher()[0].split("-")[0]
     old = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
@@ -439,13 +439,13 @@ def test_versions_of_tls(secure):
     old.set_ciphers("ALL:@SECLEVEL=0")
     old.minimum_version, old.maximum_version = ssl.TLSVersion.TLSv1, ssl.TLSVersion.TLSv1_1
     with pytest.raises((ssl.SSLError, ConnectionError)):
-        old.wrap_socket(socket.create_connection(("127.0.0.1", secure.port), timeout=60))
+        old.wrap_socket(socket.create_connection(("127.0.0.1", secure.port), timeout=180))
     assert secure.get("/healthz").status == 200
 
 
 def test_what_is_no_tls(secure):
     for data in (b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", bytes(range(256)), b"\x16\x03\x01\xff\xff" + bytes(100)):
-        with socket.create_connection(("127.0.0.1", secure.port), timeout=60) as client:
+        with socket.create_connection(("127.0.0.1", secure.port), timeout=180) as client:
             client.sendall(data)
             try:
                 client.shutdown(socket.SHUT_WR)
@@ -469,7 +469,7 @@ def test_client_that_leaves_is_noticed_over_tls(secure):
 def stratus(daemon, *arguments, **environment):
     clean = {name: value for name, value in os.environ.items() if not name.startswith("STRATUS_")}
     command = [BUILD / "stratus", "--server", f"https://127.0.0.1:{daemon.port}", *arguments]
-    return subprocess.run(command, env={**clean, **environment}, capture_output=True, text=True, timeout=120)
+    return subprocess.run(command, env={**clean, **environment}, capture_output=True, text=True, timeout=300)
 
 
 def test_client_over_tls_with_a_key(secure, keys, tmp_path):
@@ -491,7 +491,7 @@ def test_client_over_tls_with_a_key(secure, keys, tmp_path):
 
 
 def certificate_shown(daemon):
-    with ssl._create_unverified_context().wrap_socket(socket.create_connection(("127.0.0.1", daemon.port), timeout=60)) as client:
+    with ssl._create_unverified_context().wrap_socket(socket.create_connection(("127.0.0.1", daemon.port), timeout=180)) as client:
         return client.getpeercert(True)
 
 

@@ -213,7 +213,7 @@ def test_variants_are_named_by_what_they_change(daemon, variants, names):
 def test_client_needs_no_names(daemon):
     done = subprocess.run(
         [str(BUILD / "stratus"), "compare", "--server", f"http://127.0.0.1:{daemon.port}", "--set", "output.width=32", "--set", "output.height=24",
-         "--with", "radiosity.enabled=false"], capture_output=True, text=True, timeout=120)
+         "--with", "radiosity.enabled=false"], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0 and "radiosity-enabled-false" in done.stdout, done.stderr
 
 

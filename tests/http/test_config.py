@@ -135,11 +135,11 @@ def test_bad_flags_beside_it():
 # --- the supervisor ----------------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(params=["path", "abstract"])
+@pytest.fixture
 def supervisor(request, tmp_path, monkeypatch):
-    """Listens as systemd does."""
+    """Listens as systemd does, on a path unless the test says that it is to be an abstract address."""
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    name = str(tmp_path / "notify") if request.param == "path" else f"@stratus-test-{os.getpid()}"
+    name = str(tmp_path / "notify") if getattr(request, "param", "path") == "path" else f"@stratus-test-{os.getpid()}"
     listener.bind(name.replace("@", "\0"))
     listener.settimeout(ANSWER_SECONDS)
     monkeypatch.setenv("NOTIFY_SOCKET", name)
@@ -147,6 +147,7 @@ def supervisor(request, tmp_path, monkeypatch):
     listener.close()
 
 
+@pytest.mark.parametrize("supervisor", ["path", "abstract"], indirect=True)
 def test_supervisor_hears_of_the_life(supervisor, start_daemon):
     daemon = start_daemon()
     assert daemon.get("/readyz").status == 200

@@ -47,9 +47,9 @@ def doomed(tmp_path_factory):
 
 
 def test_the_delivered_program_knows_no_faults(tmp_path):
-    result = subprocess.run([BUILD / "stratusd", "--faults", tmp_path], capture_output=True, text=True, timeout=120)
+    result = subprocess.run([BUILD / "stratusd", "--faults", tmp_path], capture_output=True, text=True, timeout=300)
     assert result.returncode == 2 and "unknown flag '--faults'" in result.stderr
-    assert "--faults" not in subprocess.run([BUILD / "stratusd", "--help"], capture_output=True, text=True, timeout=120).stdout
+    assert "--faults" not in subprocess.run([BUILD / "stratusd", "--help"], capture_output=True, text=True, timeout=300).stdout
     words = (b"--faults", b"faulty_gl", b"host-memory", b"__wrap_")
     delivered, faulty = (BUILD / "stratusd").read_bytes(), (BUILD / "stratusd-faulty").read_bytes()
     assert not any(word in delivered for word in words)

@@ -11,8 +11,9 @@ import pytest
 import yaml
 from prometheus_client.openmetrics.parser import text_string_to_metric_families
 
-from conftest import ROOT
+from conftest import ROOT, measures
 
+pytestmark = measures
 OPS = ROOT / "ops"
 SMALL = {"output": {"width": 32, "height": 24}}
 # What a scraper adds of its own.
@@ -160,7 +161,7 @@ def promtool():
 
 
 def run(*command):
-    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout
 

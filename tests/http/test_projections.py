@@ -5,7 +5,7 @@ import math
 import numpy
 import pytest
 
-from conftest import query_of
+from conftest import measures, query_of
 
 SIZES = {"fisheye": (1024, 1024), "equirectangular": (2048, 1024), "cubemap": (512, 3072)}
 LUMINANCE = [0.2126, 0.7152, 0.0722]
@@ -62,6 +62,7 @@ def test_face_has_the_size_of_a_face(daemon, read_image):
     assert read_image(daemon.render(scene).body)[0].shape[:2] == (512, 512)
 
 
+@measures
 @pytest.mark.parametrize("sun", [(60, 20), (0, 45), (225, 35.2644), (10, 89.5), (270, 3)])
 @pytest.mark.parametrize("projection, width, face", [("fisheye", 100, None), ("equirectangular", 128, None), ("cubemap", 64, None), ("cubemap", 128, "+Y")])
 def test_sun(daemon, read_image, projection, width, face, sun):
@@ -89,6 +90,7 @@ def test_sun(daemon, read_image, projection, width, face, sun):
     assert numpy.linalg.norm(brightest - wanted) < 0.75 * pixel + 0.005
 
 
+@measures
 @pytest.mark.parametrize("clouds, bound", [({"type": "none"}, 0.003), ({"coverage": 0.8, "seed": 4}, 0.01)])
 def test_cosine_integral_is_the_global_illuminance(daemon, read_image, clouds, bound):
     scene = {**scene_of("equirectangular", format="exr", exr_type="float"), "clouds": clouds}
@@ -132,6 +134,7 @@ def test_exposure_is_the_same_everywhere(daemon, read_image):
     assert len(exposures) == 1
 
 
+@measures
 @pytest.mark.parametrize("kind", ["stratocumulus", "altocumulus", "cirrocumulus"])
 @pytest.mark.parametrize("projection, width", [("equirectangular", 128), ("equirectangular", 1024), ("fisheye", 256), ("cubemap", 64)])
 def test_the_beam_through_clouds(daemon, read_image, kind, projection, width):

@@ -5,7 +5,7 @@ import threading
 import numpy
 import pytest
 
-from conftest import wait_for
+from conftest import measures, wait_for
 from test_compare import channels, compare, layer
 
 TINY = {"width": 24, "height": 16}
@@ -41,6 +41,7 @@ def test_pictures_tell_their_samples(daemon, read_image):
     assert daemon.render({"output": TINY}).headers["Stratus-Samples"] is None
 
 
+@measures
 def test_standard_error_is_the_scatter_of_seeds(daemon, read_image):
     """Of the whole picture's mean: six seeds scatter as much as one of them says."""
     means, errors = [], []
@@ -135,6 +136,7 @@ def test_a_reference_that_nobody_waits_for_ends(daemon):
     assert wait_for(lambda: daemon.metric(ended) == before + 1)  # others pass it before it is asked for again
 
 
+@measures
 def test_compared_with_the_reference(daemon):
     """The reference is the truth unless told otherwise; another seed differs by noise alone, and the slab by more."""
     variants = [{}, {"name": "again", "model": {"name": "reference", "samples": 16, "seed": 7}},

@@ -305,7 +305,7 @@ def test_deadline(daemon):
 
 def test_a_late_image_is_not_sent(daemon):
     """A deadline that ends while the image is encoded counts as well."""
-    scene = {"output": {"width": 2048, "height": 2048, "png_compression": "small"}}
+    scene = {"output": {"width": 1280, "height": 1280, "png_compression": "small"}}
     timing = daemon.render(scene).timing
     allowed = int(float(timing["total"]["dur"]) - 0.7 * float(timing["encode"]["dur"]))
     azimuths = itertools.count(1)

@@ -11,7 +11,7 @@ import time
 import numpy
 import pytest
 
-from conftest import SANITIZED, in_some_try, wait_for
+from conftest import SANITIZED, in_some_try, measures, wait_for
 
 REFERENCE = json.loads((pathlib.Path(__file__).parents[1] / "data" / "slab.json").read_text())
 FLUXES = ("reflectance", "transmittance_direct", "transmittance_diffuse")
@@ -70,6 +70,7 @@ def reference_cases():
         yield case, "transmitted", azimuths, numpy.array(case["transmitted_diffuse_rows_viewzenith_cols_azimuth"])
 
 
+@measures
 def test_reference_radiances(daemon):
     errors = []
     for case, side, azimuths, expected in reference_cases():
@@ -196,6 +197,7 @@ def random_droplets(generator):
     }
 
 
+@measures
 def test_conservation(daemon):
     generator = random.Random(3)
     for droplets in ({}, random_droplets(generator), random_droplets(generator)):
@@ -233,6 +235,7 @@ def test_reciprocity(daemon):
             assert numpy.allclose(there, back, rtol=1e-3)
 
 
+@measures
 def test_radiance_adds_up_to_the_flux(daemon):
     """2 pi integral of I mu dmu over mu_l, by a grid of the interface's own."""
     mu, weight = numpy.polynomial.legendre.leggauss(24)
@@ -246,6 +249,7 @@ def test_radiance_adds_up_to_the_flux(daemon):
         assert numpy.allclose(flux, answer[name], rtol=0.01), side
 
 
+@measures
 @pytest.mark.parametrize("shading", ["solved", "paper"])
 @pytest.mark.parametrize("optics", ["mie", "paper"])
 def test_thickness_is_optical_thickness(daemon, shading, optics):
@@ -281,6 +285,7 @@ def test_droplets_matter(daemon):
 # --- the paper's form ----------------------------------------------------------------------------------------------------------------
 
 
+@measures
 @pytest.mark.parametrize("droplets", [{}, {"dsd__gamma": 12, "dsd__effective_radius_um": 11, "dsd__n0_per_cm3": 50}], ids=["seven", "eleven"])
 def test_paper_against_solved(daemon, droplets):
     """The one-dimensional model is fitted to the solver. Its radiance keeps the paper's own weakness: Lambertian light of thin layers."""
@@ -312,12 +317,13 @@ def test_paper_orders_conserve(daemon):
 # --- photons -----------------------------------------------------------------------------------------------------------------------------
 
 
+@measures
 @pytest.mark.parametrize("tau, zenith, droplets", [(1, 30, {}), (8, 60, {"dsd__gamma": 8, "dsd__effective_radius_um": 4})])
 @pytest.mark.parametrize("phase", ["full", "modified"])
 def test_photons_against_solved(daemon, tau, zenith, droplets, phase):
     layer = {"optical_thickness": tau, "sun_zenith_deg": zenith, "orders": phase, "relative_azimuth_deg": [0, 60, 120], **droplets}
     solved = slab(daemon, **layer)
-    traced = slab(daemon, shading="montecarlo", photons=20000 if SANITIZED else 200000, seed=5, **layer)
+    traced = slab(daemon, shading="montecarlo", photons=80000, seed=5, **layer)
     error = traced["standard_error"]
     close = []
     for name in FLUXES:
@@ -341,6 +347,7 @@ def test_photons_are_reproducible(daemon):
     assert other.headers["ETag"] != first.headers["ETag"]
 
 
+@measures
 def test_standard_error_falls_with_the_root_of_photons(daemon):
     layer = {"optical_thickness": 3, "shading": "montecarlo", "view_zenith_deg": 30, "relative_azimuth_deg": 90}
     few, many = (slab(daemon, photons=photons, **layer)["standard_error"] for photons in (2000, 50000))

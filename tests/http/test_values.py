@@ -4,6 +4,8 @@ import math
 import numpy
 import pytest
 
+from conftest import measures
+
 
 def test_phase_functions_integrate_to_the_sphere(daemon):
     for query in ("", "?dsd.gamma=12&dsd.effective_radius_um=10"):
@@ -58,6 +60,7 @@ def test_zenith_of_the_fit(daemon):
     assert daemon.get("/v1/optics?clouds.seed=5&dsd.gamma=0").pointers == {"/clouds/seed", "/dsd/gamma"}
 
 
+@measures
 @pytest.mark.parametrize("droplets", ["dsd.gamma=2", "dsd.gamma=9&dsd.effective_radius_um=12&dsd.n0_per_cm3=80", "model.optics=paper"])
 @pytest.mark.parametrize("zenith", [0, 37, 60])
 def test_fit_describes_a_slab_of_these_droplets(daemon, droplets, zenith):

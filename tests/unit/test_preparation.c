@@ -117,9 +117,9 @@ static void prepared_in_turn(void **state)
 	finish(fixture);
 }
 
-static void same_droplets_go_on_together(void **state)
+/* All five are to be in line before the first is done, which a busy machine may prevent. */
+static bool went_on_together(void)
 {
-	(void)state;
 	struct fixture *fixture = start(8, JOBS);
 	fixture->waiters[4].scene.dsd = fixture->waiters[0].scene.dsd;
 	for (int i = 0; i < 5; i++)
@@ -128,10 +128,19 @@ static void same_droplets_go_on_together(void **state)
 	int order[5];
 	for (int i = 0; i < 5; i++)
 		order[i] = render_next(fixture);
-	const int expected[] = {0, 4, 1, 2, 3};
-	assert_memory_equal(order, expected, sizeof order);
 	assert_int_equal(droplet_store_counts(fixture->store).from[DROPLETS_COMPUTED], 4);
 	finish(fixture);
+	const int expected[] = {0, 4, 1, 2, 3};
+	return memcmp(order, expected, sizeof order) == 0;
+}
+
+static void same_droplets_go_on_together(void **state)
+{
+	(void)state;
+	bool together = false;
+	for (int i = 0; i < 6 && !together; i++)
+		together = went_on_together();
+	assert_true(together);
 }
 
 static void full_line(void **state)

@@ -33,7 +33,7 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
 	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr openssl clang-format procps \
-	python3-prometheus-client mandoc systemd ffmpeg
+	python3-prometheus-client mandoc systemd ffmpeg gnuplot-nox
 VALIDATE_PACKAGES := gnuplot-nox
 GALLERY_PACKAGES := imagemagick
 FUZZ_PACKAGES := clang llvm

@@ -15,11 +15,11 @@ def sweep(stratus, service, *options):
 
 
 def late(good):
-    """Answers after a while, from the one numbered `good` on by refusals."""
+    """Answers after a while, from the one numbered `good` on every other time by a refusal."""
 
     def reply(handler, number, body):
         time.sleep(SLOW_S)
-        handler.problem(503) if number >= good else handler.picture()
+        handler.problem(503) if number >= good and number % 2 else handler.picture()
 
     return reply
 

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import threading
+import time
 import typing
 
 import numpy
@@ -145,10 +146,16 @@ def test_other_calls(client):
     assert [one["name"] for one in found["variants"]] == ["solved", "paper"]
 
 
-def test_a_busy_daemon_is_asked_again(service):
-    service.reply = lambda handler, number, body: handler.problem(503) if number < 2 else handler.picture()
+def test_a_busy_daemon_is_asked_again_not_before_it_says(service):
+    times = []
+
+    def reply(handler, number, body):
+        times.append(time.monotonic())
+        handler.problem(503, [("Retry-After", "1")] if number else []) if number < 2 else handler.picture()
+
+    service.reply = reply
     assert package.Client(service.url).render().data == PICTURE
-    assert len(service.asked) == 3
+    assert len(times) == 3 and times[2] - times[1] >= 0.95
     service.reply = lambda handler, *_: handler.problem(429, [("Retry-After", "7")], title="Enough")
     with pytest.raises(package.Busy) as caught:
         package.Client(service.url, retries=0).render()

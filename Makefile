@@ -7,6 +7,7 @@
 # make fuzz     throws bytes at every reader of what strangers send, FUZZ_SECONDS (600) each; FUZZ="name name" takes these alone
 # make load     offers a daemon half of what it can do up to four times as much; three minutes
 # make golden    writes what the golden render is now into renderer/golden_values.inc: after a change of what pictures look like
+# make scene-classes   writes the Python package's classes of a scene anew, after openapi.yaml changed
 # make soak     twenty minutes of mixed load with faults injected
 # make install   puts programs, manual and systemd unit below PREFIX (/usr/local), all below DESTDIR; make uninstall takes them away
 # make image     builds the container image and renders a picture with it
@@ -33,7 +34,7 @@ LDFLAGS := $(SANFLAGS) -pthread -Wl,-z,relro,-z,now
 PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libopenimageio-dev \
 	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr openssl clang-format procps \
-	python3-prometheus-client mandoc systemd ffmpeg
+	python3-prometheus-client mandoc systemd ffmpeg gnuplot-nox
 VALIDATE_PACKAGES := gnuplot-nox
 GALLERY_PACKAGES := imagemagick
 FUZZ_PACKAGES := clang llvm
@@ -59,7 +60,7 @@ RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel man install uninstall image run test fuzz replays load soak demo gallery validate judge golden unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall image run test fuzz replays load soak demo gallery validate judge golden scene-classes unit http format clean packages test-packages
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -264,6 +265,10 @@ judge: packages
 golden: packages
 	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
 	$(B)/render-bench -g renderer/golden_values.inc
+
+scene-classes:
+	@scripts/packages.sh python3 python3-yaml
+	/usr/bin/python3 clients/python/generate.py
 
 # WITHOUT="name name": but for these.
 unit: $(filter-out $(addprefix $(B)/tests/test_,$(WITHOUT)),$(UNIT)) $(B)/stratusd-faulty

@@ -3,6 +3,7 @@
 #include "clients/bench/run_compare.h"
 #include "clients/bench/sweep.h"
 #include "clients/commands.h"
+#include "clients/member_range.h"
 #include "clients/output_file.h"
 #include "clients/plot.h"
 #include "clients/scene_source.h"
@@ -18,6 +19,7 @@ struct bench_options {
 	const char *mix, *path, *json;
 	const char *plot; /* of a sweep */
 	const char *old;  /* a run that another is compared with */
+	struct text_list vary;
 	bool sweep;
 	double p99_ms;
 	struct load_settings load;
@@ -30,6 +32,8 @@ static bool is_complete(const struct bench_options *options)
 		client_error("bench takes a scene, --mix or --get, one of them");
 	else if (options->path && (*options->path != '/' || strpbrk(options->path, " \r\n")))
 		client_error("--get wants a path, such as /healthz");
+	else if (options->vary.count > 0 && (options->mix || options->path))
+		client_error("--vary is for a scene; the lines of a mix have their own");
 	else if ((options->plot || options->p99_ms > 0) && !options->sweep)
 		client_error("--plot and --within-ms belong to --sweep");
 	else if (options->plot && !plot_is_named(options->plot))
@@ -41,18 +45,47 @@ static bool is_complete(const struct bench_options *options)
 	return false;
 }
 
+/* "member=low..high" as a line of a mix has it. NULL after a message. */
+static json_t *read_vary(const struct text_list *texts)
+{
+	json_t *vary = json_object();
+	for (int i = 0; i < texts->count; i++) {
+		struct member_range range;
+		if (!member_range_read(texts->text[i], &range) || range.from > range.to) {
+			client_error("--vary wants member=low..high, not \"%s\"", texts->text[i]);
+			json_decref(vary);
+			return NULL;
+		}
+		json_t *bounds = range.whole ? json_pack("[I, I]", (json_int_t)range.from, (json_int_t)range.to)
+					     : json_pack("[f, f]", range.from, range.to);
+		json_object_set_new(vary, range.member, bounds);
+	}
+	return vary;
+}
+
+static int make_scene_mix(const struct client *client, const struct bench_options *options, struct mix **mix)
+{
+	json_t *scene = NULL, *vary = read_vary(&options->vary);
+	int status = vary ? scene_source_load(client, &options->source, &scene) : CLIENT_USAGE;
+	if (status == CLIENT_OK && !(*mix = mix_of_scene(scene, vary))) {
+		client_error("a member that is varied is none that the scene can have");
+		status = CLIENT_USAGE;
+	}
+	json_decref(scene);
+	json_decref(vary);
+	return status;
+}
+
 static int make_mix(const struct client *client, const struct bench_options *options, struct mix **mix)
 {
 	if (options->mix)
 		return mix_read(options->mix, mix);
-	json_t *scene = NULL;
-	int status = options->path ? CLIENT_OK : scene_source_load(client, &options->source, &scene);
-	if (status == CLIENT_OK && !(*mix = options->path ? mix_of_path(options->path) : mix_of_scene(scene))) {
+	if (!options->path)
+		return make_scene_mix(client, options, mix);
+	*mix = mix_of_path(options->path);
+	if (!*mix)
 		client_error("out of memory");
-		status = CLIENT_USAGE;
-	}
-	json_decref(scene);
-	return status;
+	return *mix ? CLIENT_OK : CLIENT_USAGE;
 }
 
 /* Takes the reference of an object, NULL too. */
@@ -134,6 +167,9 @@ static const struct option_row rows[] = {
 	TEXT_ROW("mix", 0, "FILE", WORDS_FILE, struct bench_options, mix,
 		 "kinds of requests, a JSON object a line: name, weight, scene, vary, or path"),
 	TEXT_ROW("get", 0, "PATH", WORDS_ANY, struct bench_options, path, "fetch a path instead of a scene"),
+	LIST_ROW("vary", "member=LOW..HIGH", WORDS_MEMBER, struct bench_options, vary,
+		 "draw a member of the scene for every request: camera.azimuth_deg=0.0..359.0; the same scene again is the daemon's memory "
+		 "alone"),
 	SCENE_SOURCE_ROWS(struct bench_options, source),
 	NUMBER_ROW("seed", "N", 0, 4294967295.0, struct bench_options, load.seed, "of what is drawn at random (1)"),
 	FLAG_ROW("sweep", 0, struct bench_options, sweep,

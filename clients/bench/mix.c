@@ -204,14 +204,20 @@ static struct mix *mix_of(const char *name)
 	return mix;
 }
 
-struct mix *mix_of_scene(const json_t *scene)
+struct mix *mix_of_scene(const json_t *scene, const json_t *vary)
 {
 	struct mix *mix = mix_of("scene");
-	if (mix && !(mix->kind[0].scene = json_deep_copy(scene))) {
-		mix_destroy(mix);
+	if (!mix)
 		return NULL;
-	}
-	return mix;
+	struct mix_kind *kind = &mix->kind[0];
+	kind->scene = json_deep_copy(scene);
+	kind->vary = json_object_size(vary) > 0 ? json_deep_copy(vary) : NULL;
+	json_t *trial = kind->scene ? draw_scene(&mix->draws, kind) : NULL;
+	json_decref(trial);
+	if (trial)
+		return mix;
+	mix_destroy(mix);
+	return NULL;
 }
 
 struct mix *mix_of_path(const char *path)

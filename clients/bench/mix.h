@@ -30,8 +30,9 @@ struct mix_request {
 
 /* Reads a file ("-": standard input). An enum client_exit, after a message when it is not CLIENT_OK; *mix is then NULL. */
 int mix_read(const char *path, struct mix **mix);
-/* One kind: a scene (the reference stays the caller's) or, when that is NULL, a path that is fetched. NULL when out of memory. */
-struct mix *mix_of_scene(const json_t *scene);
+/* One kind: a scene with members that are drawn, as a line of a file has them (the references stay the caller's), or a path that is
+ * fetched. NULL when out of memory, or after a message when the scene cannot have such a member. */
+struct mix *mix_of_scene(const json_t *scene, const json_t *vary);
 struct mix *mix_of_path(const char *path);
 /* Takes NULL. */
 void mix_destroy(struct mix *mix);

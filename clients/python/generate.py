@@ -9,7 +9,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 SCHEMA = HERE.parents[1] / "openapi.yaml"
 MADE = HERE / "stratus" / "scene.py"
 
-HEAD = '''"""Scenes, typed. Made from openapi.yaml by generate.py: change that, not this.
+HEAD = '''"""Scenes, typed. Made from openapi.yaml by generate.py (make scene-classes): change that, not this.
 
 Every member may be left out (None): the daemon's default then holds, which the comment says. What is out of range the daemon refuses, naming
 the member; `limits` tells ranges, for drawing scenes at random.
@@ -96,5 +96,5 @@ def write_all():
 
 if __name__ == "__main__":
     if "--check" in sys.argv[1:]:
-        sys.exit(0 if MADE.read_text() == write_all() else "stratus/scene.py is not what openapi.yaml says: run generate.py")
+        sys.exit(0 if MADE.read_text() == write_all() else "stratus/scene.py is not what openapi.yaml says: make scene-classes")
     MADE.write_text(write_all())

@@ -281,3 +281,14 @@ def test_a_mix_that_is_wrong_says_where(tmp_path, line, words):
 )
 def test_usage(options, status):
     assert run("http://127.0.0.1:1", *options).returncode == status
+
+
+def test_a_scene_may_vary(serve):
+    server = serve(lambda *_: plain())
+    vary = ["--vary", "sun.elevation_deg=5.0..60.0", "--vary", "clouds.seed=1..3"]
+    found = figures(server.url, "--rate", "100", "--duration", "0.5", "--warm-up", "0", "--set", "output.width=64", *vary)
+    assert found["good"]["count"] == len(server.bodies) == 50
+    assert all(body["output"] == {"width": 64} and 5 <= body["sun"]["elevation_deg"] <= 60 for body in server.bodies)
+    assert {body["clouds"]["seed"] for body in server.bodies} == {1, 2, 3} and len({body["sun"]["elevation_deg"] for body in server.bodies}) == 50
+    for wrong in (["--vary", "sun"], ["--vary", "a.b=2..1"], ["--vary", "a.b=1..2", "--get", "/x"], ["--set", "a=1", "--vary", "a.b=1..2"]):
+        assert run(server.url, *wrong).returncode == 2

@@ -1,11 +1,14 @@
 """The Python package: its classes against openapi.yaml, its pictures against another reader, its errors, its documentation by running it."""
 import csv
+import html
 import itertools
+import json
 import os
 import re
 import subprocess
 import sys
 import threading
+import time
 import typing
 
 import numpy
@@ -145,10 +148,16 @@ def test_other_calls(client):
     assert [one["name"] for one in found["variants"]] == ["solved", "paper"]
 
 
-def test_a_busy_daemon_is_asked_again(service):
-    service.reply = lambda handler, number, body: handler.problem(503) if number < 2 else handler.picture()
+def test_a_busy_daemon_is_asked_again_not_before_it_says(service):
+    times = []
+
+    def reply(handler, number, body):
+        times.append(time.monotonic())
+        handler.problem(503, [("Retry-After", "1")] if number else []) if number < 2 else handler.picture()
+
+    service.reply = reply
     assert package.Client(service.url).render().data == PICTURE
-    assert len(service.asked) == 3
+    assert len(times) == 3 and times[2] - times[1] >= 0.95
     service.reply = lambda handler, *_: handler.problem(429, [("Retry-After", "7")], title="Enough")
     with pytest.raises(package.Busy) as caught:
         package.Client(service.url, retries=0).render()
@@ -224,6 +233,22 @@ def test_examples_of_the_documentation_run(real_daemon, tmp_path, number):
     assert len(code) == 2
     printed = run_script(real_daemon, tmp_path, "-c", code[number])
     assert number == 1 or printed.splitlines()[0] == "(240, 320, 3) uint8"
+
+
+def test_the_notebook_finds_the_glory_where_theory_has_it(real_daemon, tmp_path):
+    cells = json.loads((ROOT / "examples" / "skies.ipynb").read_text())["cells"]
+    printed = run_script(real_daemon, tmp_path, "-c", "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"))
+    rings = re.findall(r"ring at ([\d.]+) degrees in the picture, ([\d.]+) by Mie theory", printed)
+    assert len(rings) == 4 and all(abs(float(seen) - float(computed)) <= 0.31 for seen, computed in rings), printed
+    assert "/moon: is not a member of a scene" in printed
+
+
+def test_pictures_of_the_page_are_such_as_the_daemon_draws(real_daemon):
+    page = (ROOT / "examples" / "embed.html").read_text()
+    sources = [html.unescape(source) for source in re.findall(r'src="([^"]+)"', page)]
+    assert len(sources) == 2
+    for source in sources:
+        assert real_daemon.head(source.removeprefix("http://127.0.0.1:8080")).status == 200
 
 
 def test_the_data_set(real_daemon, tmp_path):

@@ -1,4 +1,4 @@
-"""Scenes, typed. Made from openapi.yaml by generate.py: change that, not this.
+"""Scenes, typed. Made from openapi.yaml by generate.py (make scene-classes): change that, not this.
 
 Every member may be left out (None): the daemon's default then holds, which the comment says. What is out of range the daemon refuses, naming
 the member; `limits` tells ranges, for drawing scenes at random.

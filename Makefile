@@ -52,7 +52,7 @@ UNIT_SRC := $(wildcard tests/unit/test_*.c)
 VALIDATE_SRC := $(wildcard tests/validate/*.c)
 UNIT_CXX := $(wildcard tests/unit/test_*.cpp)
 SHADERS := $(wildcard shaders/*.glsl shaders/*/*.glsl)
-RESOURCES := openapi.yaml server/pages/index.html $(wildcard server/presets/*.json)
+RESOURCES := openapi.yaml $(wildcard server/pages/*.* server/pages/*/*.* server/presets/*.json)
 
 obj = $(patsubst %,$(B)/%.o,$(1))
 RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o

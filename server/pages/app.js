@@ -1,6 +1,7 @@
 /** The page: what belongs together is put together here. */
 import { CameraHand } from "./picture/camera.js";
 import { Comparison } from "./picture/compare.js";
+import { Probe } from "./picture/probe.js";
 import { RenderLoop } from "./picture/loop.js";
 import { Sizes } from "./picture/size.js";
 import { Stage } from "./picture/stage.js";
@@ -19,6 +20,7 @@ import { Tabs } from "./panels/tabs.js";
 import { followTheme } from "./panels/theme.js";
 import { TimingBar } from "./panels/timing_bar.js";
 import { fromQuery, toQuery } from "./scene/address.js";
+import { FIELDS } from "./scene/fields.js";
 import { Scene } from "./scene/scene.js";
 import { Problem, fetchJson } from "./service/api.js";
 
@@ -67,10 +69,15 @@ function failed(error) {
 		retry = setTimeout(() => loop.changed(), 1000 * seconds);
 }
 
+function labelOf(pointer) {
+	const field = FIELDS.get(pointer.slice(1).replaceAll("/", "."));
+	return field ? `${field.label}:` : pointer;
+}
+
 function kindly(error, seconds) {
 	const [first] = error.errors ?? [];
 	if (first)
-		return `${first.pointer.slice(1).replaceAll("/", ", ").replaceAll("_", " ")} ${first.detail}. The picture is the last one that could be had.`;
+		return `${labelOf(first.pointer)} ${first.detail}. The picture is the last one that could be had.`;
 	return seconds ? `${error.message} Asking again in ${seconds} s.` : error.message;
 }
 
@@ -131,6 +138,7 @@ $("compare").addEventListener("change", ({ target }) => {
 addEventListener("hashchange", () => location.hash !== written && scene.replace(fromQuery(location.hash.slice(1))));
 new ResizeObserver(() => loop.rest()).observe(stage.element);
 new CameraHand(scene, stage, loop);
+new Probe(scene, viewer, $("stage-help"), { sun: () => dome.sun, failed });
 followTheme($("theme"));
 tabs = new Tabs($("tabs"), (name) => name === "layers" && layers.follow());
 askForKey($("key-dialog"), () => {

@@ -40,18 +40,18 @@ export function findMarks({ angle_deg: angles, value: [, green] }) {
 	return [["fogbow", bow], ["glory", glory]].filter(([, i]) => i >= 0).map(([name, i]) => ({ name, angle: angles[i], value: green[i] }));
 }
 
-const angleText = ({ name, angle }) => `${name} ${Number(angle.toFixed(name === "glory" ? 1 : 0))}°`;
+const withAngle = ({ name, angle }) => `${name} ${Number(angle.toFixed(name === "glory" ? 1 : 0))}°`;
 
 function drawBands(to, angles, value, place) {
 	return value.map((values, band) => svg("path", { class: `band ${CLASSES[band]}`, d: line(angles.map((a, i) => [to.x(a), to.y(place(values[i]))])) }));
 }
 
 /** Vertical lines down to the curve, with their names left of them. */
-function drawMarks(to, marks) {
+function drawMarks(to, marks, text) {
 	return marks.map((mark) => {
 		const x = to.x(mark.angle);
 		return svg("g", {}, svg("path", { class: "mark", d: `M${x.toFixed(1)} ${to.top}V${Math.max(to.y(mark.value) - 3, to.top).toFixed(1)}` }),
-			svg("text", { class: "mark-text", x: x - 4, y: to.top + 8, "text-anchor": "end" }, angleText(mark)));
+			svg("text", { class: "mark-text", x: x - 4, y: to.top + 8, "text-anchor": "end" }, text(mark)));
 	});
 }
 
@@ -60,7 +60,7 @@ export function drawAll(figure, phase) {
 	const { angle_deg: angles, value } = phase;
 	const to = scales(WIDE, { from: 0, to: 180 }, { from: FROM, to: TO, log: true });
 	const lines = grid(to, [0, 30, 60, 90, 120, 150, 180].map((a) => [a, `${a}°`]), [-2, 0, 2, 4].map((p) => [10 ** p, SUPERSCRIPT[p]]));
-	figure.replaceChildren(lines, ...drawBands(to, angles, value, (v) => Math.min(Math.max(v, FROM), TO)), ...drawMarks(to, findMarks(phase)));
+	figure.replaceChildren(lines, ...drawBands(to, angles, value, (v) => Math.min(Math.max(v, FROM), TO)), ...drawMarks(to, findMarks(phase), ({ name }) => name));
 }
 
 /** The backward ones, linear. */
@@ -72,7 +72,7 @@ export function drawBack(figure, phase) {
 	const top = [0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((t) => t >= 1.12 * most) ?? most;
 	const to = scales(WIDE, { from: 130, to: 180 }, { from: 0, to: top });
 	const lines = grid(to, [130, 140, 150, 160, 170, 180].map((a) => [a, `${a}°`]), [0, top / 2, top].map((v) => [v, String(v)]));
-	figure.replaceChildren(lines, ...drawBands(to, angles, value, (v) => v), ...drawMarks(to, findMarks(phase)));
+	figure.replaceChildren(lines, ...drawBands(to, angles, value, (v) => v), ...drawMarks(to, findMarks(phase), withAngle));
 }
 
 export function drawPolar(figure, phase) {

@@ -95,13 +95,16 @@ export class Controls {
 	mark(errors) {
 		for (const { row } of this.#rows.values())
 			setWrong(row, "");
-		return errors.filter(({ pointer, detail }) => {
+		const others = errors.filter(({ pointer, detail }) => {
 			const path = pointer.slice(1).replaceAll("/", ".");
 			const found = this.#rows.get(path) ?? [...this.#rows].find(([other]) => other.startsWith(`${path}.`))?.[1];
 			if (found)
 				setWrong(found.row, detail);
 			return !found;
 		});
+		for (const panel of document.querySelectorAll("[role=tabpanel]"))
+			document.querySelector(`[aria-controls=${panel.id}]`).classList.toggle("bad", panel.querySelector(".bad") !== null);
+		return others;
 	}
 }
 

@@ -1,5 +1,6 @@
 /** The sky from above, the zenith in the middle: the sun to be dragged, what the camera sees, and the way of the sun over the day. */
 import { line, svg } from "../figures/svg.js";
+import { directionAt } from "../scene/direction.js";
 
 /** Radius of the horizon; a degree has the same length above and below it. */
 const HORIZON = 100;
@@ -19,18 +20,10 @@ function direction(x, y) {
 }
 
 /** Edge of a perspective picture as directions. */
-function frameOf(scene) {
-	const [azimuth, elevation, roll] = ["azimuth", "elevation", "roll"].map((name) => scene.value(`camera.${name}_deg`) * rad);
-	const half = Math.tan((scene.value("camera.vertical_fov_deg") / 2) * rad);
-	const [ca, sa, ce, se] = [Math.cos(azimuth), Math.sin(azimuth), Math.cos(elevation), Math.sin(elevation)];
+function edgeOf(scene) {
 	const corners = [[-1, 1], [1, 1], [1, -1], [-1, -1], [-1, 1]];
 	const points = corners.slice(1).flatMap((to, i) => Array.from({ length: 16 }, (_, k) => [0, 1].map((c) => corners[i][c] + ((to[c] - corners[i][c]) * k) / 16)));
-	return points.map(([u, v]) => {
-		const [x, y] = [u * half * scene.shape, v * half];
-		const [right, up] = [x * Math.cos(roll) + y * Math.sin(roll), y * Math.cos(roll) - x * Math.sin(roll)];
-		const [east, north, high] = [sa * ce + right * ca - up * sa * se, ca * ce - right * sa - up * ca * se, se + up * ce];
-		return { azimuth: Math.atan2(east, north) / rad, elevation: Math.atan2(high, Math.hypot(east, north)) / rad };
-	});
+	return points.map(([u, v]) => directionAt(scene, u, v));
 }
 
 export class Dome {
@@ -79,7 +72,7 @@ export class Dome {
 
 	/** What the camera sees. */
 	follow() {
-		const edge = this.scene.isPanorama ? [] : frameOf(this.scene).map(({ azimuth, elevation }) => place(azimuth, elevation));
+		const edge = this.scene.isPanorama ? [] : edgeOf(this.scene).map(({ azimuth, elevation }) => place(azimuth, elevation));
 		this.view.setAttribute("d", edge.length ? `${line(edge)}Z` : "");
 	}
 

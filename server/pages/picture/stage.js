@@ -24,6 +24,15 @@ export class Stage {
 		return { width: canvas.width * zoom, height: canvas.height * zoom };
 	}
 
+	/** A pointer's place in the picture, from its upper left corner, 1 being its width and height; null beside it. */
+	placeOf({ clientX, clientY }) {
+		const box = this.element.getBoundingClientRect();
+		const { width, height } = this.frame;
+		const x = (clientX - box.left - (box.width - width) / 2) / width;
+		const y = (clientY - box.top - (box.height - height) / 2) / height;
+		return x >= 0 && x < 1 && y >= 0 && y < 1 ? { x, y } : null;
+	}
+
 	/** @param {"picture" | "other"} pane  @param {ImageBitmap | ImageData} image */
 	draw(pane, image) {
 		const canvas = this.canvases[pane];
@@ -49,10 +58,10 @@ export class Stage {
 		this.element.setAttribute("aria-busy", String(kind === "full"));
 	}
 
-	describe(kind, { width, height }) {
-		this.element.dataset.shows = kind;
-		this.element.dataset.pictures = String(Number(this.element.dataset.pictures ?? 0) + 1);
-		this.element.dataset.size = `${width}x${height}`;
+	/** What is shown, for whoever looks at the page from outside: tests, and scripts of users. */
+	describe(kind, { width, height }, members) {
+		const { output, ...scene } = members;
+		Object.assign(this.element.dataset, { shows: kind, size: `${width}x${height}`, scene: JSON.stringify(scene) });
 	}
 
 	/** Names over the two halves; null: one picture. */

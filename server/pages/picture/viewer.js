@@ -62,7 +62,7 @@ export class Viewer {
 		const size = this.layer === "color" ? await this.#showPng(pane, blob, signal) : await this.#showLayer(pane, blob, signal);
 		this.sizes.learn(size.width * size.height, timing);
 		if (pane === "picture")
-			this.stage.describe(kind, size);
+			this.stage.describe(kind, size, members);
 		return { ...size, took, timing, shown: performance.now() - began, bytes: blob.size };
 	}
 
@@ -100,9 +100,23 @@ export class Viewer {
 		return this.#light.exr;
 	}
 
+	#hasLight() {
+		return this.#light?.key === toQuery(this.#lightMembers());
+	}
+
+	/** Luminance at a place of the picture, cd/m2; null while its light is not known. */
+	luminanceAt({ x, y }) {
+		if (!this.#hasLight())
+			return null;
+		const { exr } = this.#light;
+		const at = Math.floor(y * exr.height) * exr.width + Math.floor(x * exr.width);
+		const [r, g, b] = planesOf(exr, "color").map((plane) => plane[at]);
+		return 1000 * (0.2126 * r + 0.7152 * g + 0.0722 * b);
+	}
+
 	/** The picture at rest with the exposure that the scene now says, out of light that was fetched; false when there is none of this scene. */
 	developLight() {
-		if (this.#light?.key !== toQuery(this.#lightMembers()) || this.layer !== "color")
+		if (!this.#hasLight() || this.layer !== "color")
 			return false;
 		const { exr } = this.#light;
 		const image = new ImageData(exr.width, exr.height);

@@ -71,7 +71,7 @@ const LIST = [
 
 	{ path: "output.width", label: "Width", unit: "px", min: 16, max: 8192, low: 320, high: 4096, step: 1, initial: 1280 },
 	{ path: "output.height", label: "Height", unit: "px", min: 16, max: 8192, low: 200, high: 4096, step: 1, initial: 800 },
-	{ path: "output.exposure_ev", label: "Exposure", unit: "EV", min: -20, max: 20, low: -10, high: 6, step: 0.1, initial: "auto" },
+	{ path: "output.exposure_ev", label: "Exposure", unit: "EV", min: -20, max: 20, low: -10, high: 16, step: 0.1, initial: "auto" },
 	{ path: "output.tone", label: "Tone", initial: "filmic", choices: [["filmic", "Film"], ["linear", "Linear"]] },
 ];
 

@@ -1,0 +1,191 @@
+/** The picture and its loop: what is asked for, when, and what is given up. */
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { Daemon, Visit, difference, launch } from "./harness.mjs";
+
+let daemon, browser;
+before(async () => {
+	daemon = await Daemon.start();
+	browser = await launch();
+});
+after(async () => {
+	await browser?.close();
+	await daemon?.stop();
+});
+
+/** Runs a visit to its end; nothing may have gone wrong in it but what it says. */
+function visiting(name, hash, body, context) {
+	test(name, async () => {
+		const visit = await Visit.open(browser, daemon, hash, context);
+		try {
+			await body(visit);
+			assert.deepEqual(visit.wrong, []);
+		} finally {
+			await visit.close();
+		}
+	});
+}
+
+const isFull = (url) => Number(url.searchParams.get("output.width")) > 480;
+const isRender = (url) => url.pathname === "/v1/render" && url.searchParams.get("output.width") !== "176";
+
+visiting("loads, of the service alone, and shows a picture", "", async (visit) => {
+	await visit.load();
+	await visit.rests();
+	const pixels = await visit.pixels();
+	assert.ok(new Set(pixels).size > 100, "a picture has many values");
+	assert.deepEqual(visit.asked.filter((url) => !url.startsWith(daemon.url) && !url.startsWith("blob:")), []);
+	await visit.until(() => document.querySelector("#timing-list .stage-view b").textContent.endsWith(" ms"));
+	await visit.until(() => document.querySelectorAll("#timing-bar span").length > 1);
+	await visit.until(() => document.querySelectorAll("#presets img").length > 0);
+});
+
+visiting("the sun is dragged, and the picture follows", "", async (visit) => {
+	await visit.load();
+	await visit.rests();
+	const before = await visit.pixels();
+	const dome = await visit.page.locator("#dome").boundingBox();
+	const at = (x, y) => [dome.x + (dome.width * (124 + x)) / 248, dome.y + (dome.height * (124 + y)) / 248];
+	await visit.page.mouse.move(...at(42, 47));
+	await visit.page.mouse.down();
+	await visit.page.mouse.move(...at(0, 50), { steps: 4 });
+	await visit.page.mouse.move(...at(-50, 0), { steps: 4 });
+	await visit.until(() => JSON.parse(document.getElementById("stage").dataset.scene).sun?.azimuth_deg === 270);
+	await visit.page.mouse.up();
+	await visit.rests({ "sun.azimuth_deg": 270 });
+	const elevation = Number(await visit.page.inputValue("#field-sun-elevation-deg"));
+	assert.ok(Math.abs(elevation - 45) < 1.5, `half way to the horizon is 45 degrees, not ${elevation}`);
+	assert.ok(difference(before, await visit.pixels()) > 3);
+	await visit.page.locator("#sun-handle").press("Shift+ArrowRight");
+	await visit.rests({ "sun.azimuth_deg": 280 });
+});
+
+visiting("the camera is turned by dragging, by the wheel and by keys", "", async (visit) => {
+	await visit.load();
+	await visit.rests();
+	const stage = await visit.page.locator("#stage").boundingBox();
+	const middle = [stage.x + stage.width / 2, stage.y + stage.height / 2];
+	await visit.page.mouse.move(...middle);
+	await visit.page.mouse.down();
+	await visit.page.mouse.move(middle[0] - stage.height / 2, middle[1], { steps: 5 });
+	await visit.page.mouse.up();
+	await visit.rests();
+	const azimuth = Number(await visit.page.inputValue("#field-camera-azimuth-deg"));
+	assert.ok(Math.abs(azimuth - (140 + 30 / Math.cos((20 * Math.PI) / 180))) < 0.5, `half a field of view to the right, not ${azimuth}`);
+	await visit.enter("camera.azimuth_deg", 140).catch(() => {});
+	const stageElement = visit.page.locator("#stage");
+	await stageElement.press("ArrowUp");
+	await visit.rests({ "camera.elevation_deg": 22 });
+	await stageElement.press("r");
+	await visit.rests({ "camera.position_m": [0, 0, 2.5] });
+	await visit.page.mouse.wheel(0, -400);
+	await visit.until(() => JSON.parse(document.getElementById("stage").dataset.scene).camera.vertical_fov_deg < 50);
+});
+
+visiting("a picture at full size is given up when something changes", "", async (visit) => {
+	await visit.load();
+	await visit.rests();
+	await visit.page.route((url) => isRender(url) && isFull(url) && url.searchParams.get("sun.elevation_deg") === "20", () => {}); /* never answered */
+	await visit.enter("sun.elevation_deg", 20);
+	await visit.until(() => document.getElementById("stage").dataset.working === "full");
+	const stale = visit.renders.at(-1);
+	assert.ok(stale.includes("sun.elevation_deg=20"));
+	await visit.enter("sun.elevation_deg", 50);
+	await visit.rests({ "sun.elevation_deg": 50 });
+	assert.ok(visit.aborted.includes(stale), "the browser has given it up");
+});
+
+visiting("quick pictures do not queue: after the one in work comes the newest", "", async (visit) => {
+	await visit.load();
+	await visit.rests();
+	let release;
+	const held = new Promise((done) => (release = done));
+	await visit.page.route((url) => isRender(url) && url.searchParams.get("sun.elevation_deg") === "20", async (route) => {
+		await held;
+		await route.continue();
+	});
+	await visit.enter("sun.elevation_deg", 20);
+	await visit.until(() => document.getElementById("stage").dataset.working === "quick");
+	const count = visit.renders.length;
+	for (const elevation of [30, 40, 50, 60])
+		await visit.enter("sun.elevation_deg", elevation);
+	assert.equal(visit.renders.length, count, "one is in work, the others wait");
+	release();
+	await visit.rests({ "sun.elevation_deg": 60 });
+	assert.deepEqual(visit.renders.slice(count).filter((url) => !url.includes("sun.elevation_deg=60")), [], "those between are never asked for");
+});
+
+test("a refusal is said beside the control, and is over when it is mended", async () => {
+	const visit = await Visit.open(browser, daemon);
+	await visit.load();
+	await visit.rests();
+	await visit.tab("camera");
+	await visit.enter("camera.position_m.2", 1300);
+	await visit.until(() => !document.querySelector("[data-path='camera.position_m.2'] .wrong").hidden);
+	assert.match(await visit.page.textContent("[data-path='camera.position_m.2'] .wrong"), /inside the cloud layer/);
+	assert.equal(await visit.page.getAttribute("#field-camera-position-m-2", "aria-invalid"), "");
+	assert.match(await visit.page.textContent("#notice"), /Height: .*inside the cloud layer/);
+	await visit.enter("camera.position_m.2", 10);
+	await visit.rests({ "camera.position_m": [0, 0, 10] });
+	assert.ok(await visit.page.isHidden("#notice"));
+	assert.ok(await visit.page.isHidden("[data-path='camera.position_m.2'] .wrong"));
+	/* A browser reports refusals as errors of its own: these and no others. */
+	assert.deepEqual(visit.wrong.filter((text) => !text.includes("422")), []);
+	await visit.close();
+});
+
+visiting("a busy service is asked again when it says", "", async (visit) => {
+	await visit.load();
+	await visit.rests();
+	let refused = 0;
+	await visit.page.route((url) => isRender(url) && url.searchParams.get("sun.elevation_deg") === "21", (route) =>
+		refused++ ? route.continue() : route.fulfill({ status: 503, headers: { "Retry-After": "1" }, contentType: "application/problem+json", body: `{"title":"Busy","detail":"Too much to do."}` }));
+	await visit.enter("sun.elevation_deg", 21);
+	await visit.rests({ "sun.elevation_deg": 21 });
+	assert.ok(refused > 1);
+	visit.wrong = visit.wrong.filter((text) => !text.includes("503"));
+});
+
+visiting("a shared address restores the scene", "#sun.elevation_deg=12.5&sun.azimuth_deg=200&clouds.wind_mps=-4,7&camera.position_m=10,20,3&radiosity.enabled=false&ground.type=snow", async (visit) => {
+	await visit.load();
+	const wanted = { "sun.elevation_deg": 12.5, "sun.azimuth_deg": 200, "clouds.wind_mps": [-4, 7], "camera.position_m": [10, 20, 3], "radiosity.enabled": false, "ground.type": "snow" };
+	await visit.rests(wanted);
+	assert.equal(await visit.page.inputValue("#field-sun-elevation-deg"), "12.5");
+	assert.equal(await visit.page.inputValue("#field-clouds-wind-mps-0"), "-4");
+	assert.equal(await visit.page.inputValue("#field-ground-type"), "snow");
+	assert.equal(await visit.page.isChecked("#field-radiosity-enabled"), false);
+	const first = await visit.pixels();
+	await visit.tab("share");
+	const shared = await visit.page.inputValue("#share-address");
+	const again = await Visit.open(browser, daemon, shared.slice(shared.indexOf("#")));
+	await again.load();
+	await again.rests(wanted);
+	assert.equal(difference(first, await again.pixels()), 0, "the same scene is the same picture");
+	const answer = await fetch(`${daemon.url}/v1/render`, { method: "POST", headers: { "Content-Type": "application/json" }, body: await visit.page.inputValue("#share-json") });
+	assert.equal(answer.status, 200);
+	assert.match(answer.headers.get("content-location"), /sun\.elevation_deg=12\.5/);
+	await again.close();
+});
+
+visiting("the address follows the scene", "", async (visit) => {
+	await visit.load();
+	await visit.enter("sun.elevation_deg", 66);
+	await visit.until(() => location.hash.includes("sun.elevation_deg=66"));
+});
+
+visiting("the page works on a phone", "", async (visit) => {
+	await visit.load();
+	await visit.rests();
+	const wide = await visit.page.evaluate(() => document.documentElement.scrollWidth);
+	assert.ok(wide <= 390, `nothing is wider than the screen: ${wide}`);
+	const stage = await visit.page.locator("#stage").boundingBox();
+	assert.ok(stage.y < 100 && stage.width > 350, "the picture comes first, as wide as the screen");
+	await visit.page.tap("#tab-droplets");
+	await visit.until(() => document.querySelectorAll("#figure-polar path.band").length === 3);
+	await visit.page.tap("#tab-sun");
+	const dome = visit.page.locator("#dome");
+	await dome.scrollIntoViewIfNeeded();
+	const box = await dome.boundingBox();
+	await visit.page.touchscreen.tap(box.x + box.width / 2, box.y + box.height * 0.8);
+	await visit.until(() => JSON.parse(document.getElementById("stage").dataset.scene).sun?.azimuth_deg === 180);
+}, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });

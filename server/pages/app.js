@@ -143,6 +143,7 @@ followTheme($("theme"));
 tabs = new Tabs($("tabs"), (name) => name === "layers" && layers.follow());
 askForKey($("key-dialog"), () => {
 	loop.changed({ afresh: true });
+	share.follow();
 	begin();
 });
 

@@ -1,10 +1,12 @@
 /** A daemon of its own on a free port, Chromium, and what tests of the page have in common. Nothing here waits for time: only for what is to happen. */
+import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { mkdtempSync, openSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { createInterface } from "node:readline";
+import { after, before, test } from "node:test";
 
 const BUILD = resolve(process.env.STRATUS_BUILD ?? "build");
 const require = createRequire(join(resolve(process.env.STRATUS_WEB_MODULES ?? "build/web-test"), "node_modules", "x.js"));
@@ -83,9 +85,9 @@ export class Visit {
 		}, wanted);
 	}
 
-	/** The pixels of a canvas. */
+	/** Values of pixels of a canvas, one in seventeen. */
 	pixels(canvas = "#picture") {
-		return this.page.$eval(canvas, (element) => [...element.getContext("2d").getImageData(0, 0, element.width, element.height).data]);
+		return this.page.$eval(canvas, (element) => [...element.getContext("2d").getImageData(0, 0, element.width, element.height).data].filter((_, i) => i % 17 === 0));
 	}
 
 	/** Addresses of renders that were asked for, newest last. */
@@ -107,6 +109,35 @@ export class Visit {
 	close() {
 		return this.context.close();
 	}
+}
+
+/**
+ * Runs a file's tests: `check` names one, which is given a page that is open and at rest; nothing may have gone wrong in it by its end but what it took
+ * off `wrong`. Everything is closed whatever happens.
+ */
+export function suite() {
+	const has = { daemon: null, browser: null };
+	before(async () => {
+		has.daemon = await Daemon.start();
+		has.browser = await launch();
+	});
+	after(async () => {
+		await has.browser?.close();
+		await has.daemon?.stop();
+	});
+	const open = async (t, hash, context, daemon = has.daemon) => {
+		const visit = await Visit.open(has.browser, daemon, hash, context);
+		t.after(() => visit.close());
+		return visit.load();
+	};
+	const check = (name, hash, body, context) =>
+		test(name, async (t) => {
+			const visit = await open(t, hash, context);
+			await visit.rests();
+			await body(visit, t);
+			assert.deepEqual(visit.wrong, []);
+		});
+	return { has, open, check };
 }
 
 /** Mean absolute difference of two pictures in codes. */

@@ -1,48 +1,22 @@
 /** The picture and its loop: what is asked for, when, and what is given up. */
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { Daemon, Visit, difference, launch } from "./harness.mjs";
+import { difference, suite } from "./harness.mjs";
 
-let daemon, browser;
-before(async () => {
-	daemon = await Daemon.start();
-	browser = await launch();
-});
-after(async () => {
-	await browser?.close();
-	await daemon?.stop();
-});
-
-/** Runs a visit to its end; nothing may have gone wrong in it but what it says. */
-function visiting(name, hash, body, context) {
-	test(name, async () => {
-		const visit = await Visit.open(browser, daemon, hash, context);
-		try {
-			await body(visit);
-			assert.deepEqual(visit.wrong, []);
-		} finally {
-			await visit.close();
-		}
-	});
-}
+const { has, open, check } = suite();
 
 const isFull = (url) => Number(url.searchParams.get("output.width")) > 480;
 const isRender = (url) => url.pathname === "/v1/render" && url.searchParams.get("output.width") !== "176";
 
-visiting("loads, of the service alone, and shows a picture", "", async (visit) => {
-	await visit.load();
-	await visit.rests();
+check("loads, of the service alone, and shows a picture", "", async (visit) => {
 	const pixels = await visit.pixels();
 	assert.ok(new Set(pixels).size > 100, "a picture has many values");
-	assert.deepEqual(visit.asked.filter((url) => !url.startsWith(daemon.url) && !url.startsWith("blob:")), []);
+	assert.deepEqual(visit.asked.filter((url) => !url.startsWith(has.daemon.url) && !url.startsWith("blob:")), []);
 	await visit.until(() => document.querySelector("#timing-list .stage-view b").textContent.endsWith(" ms"));
 	await visit.until(() => document.querySelectorAll("#timing-bar span").length > 1);
 	await visit.until(() => document.querySelectorAll("#presets img").length > 0);
 });
 
-visiting("the sun is dragged, and the picture follows", "", async (visit) => {
-	await visit.load();
-	await visit.rests();
+check("the sun is dragged, and the picture follows", "", async (visit) => {
 	const before = await visit.pixels();
 	const dome = await visit.page.locator("#dome").boundingBox();
 	const at = (x, y) => [dome.x + (dome.width * (124 + x)) / 248, dome.y + (dome.height * (124 + y)) / 248];
@@ -60,9 +34,7 @@ visiting("the sun is dragged, and the picture follows", "", async (visit) => {
 	await visit.rests({ "sun.azimuth_deg": 280 });
 });
 
-visiting("the camera is turned by dragging, by the wheel and by keys", "", async (visit) => {
-	await visit.load();
-	await visit.rests();
+check("the camera is turned by dragging, by the wheel and by keys", "", async (visit) => {
 	const stage = await visit.page.locator("#stage").boundingBox();
 	const middle = [stage.x + stage.width / 2, stage.y + stage.height / 2];
 	await visit.page.mouse.move(...middle);
@@ -72,7 +44,6 @@ visiting("the camera is turned by dragging, by the wheel and by keys", "", async
 	await visit.rests();
 	const azimuth = Number(await visit.page.inputValue("#field-camera-azimuth-deg"));
 	assert.ok(Math.abs(azimuth - (140 + 30 / Math.cos((20 * Math.PI) / 180))) < 0.5, `half a field of view to the right, not ${azimuth}`);
-	await visit.enter("camera.azimuth_deg", 140).catch(() => {});
 	const stageElement = visit.page.locator("#stage");
 	await stageElement.press("ArrowUp");
 	await visit.rests({ "camera.elevation_deg": 22 });
@@ -82,9 +53,7 @@ visiting("the camera is turned by dragging, by the wheel and by keys", "", async
 	await visit.until(() => JSON.parse(document.getElementById("stage").dataset.scene).camera.vertical_fov_deg < 50);
 });
 
-visiting("a picture at full size is given up when something changes", "", async (visit) => {
-	await visit.load();
-	await visit.rests();
+check("a picture at full size is given up when something changes", "", async (visit) => {
 	await visit.page.route((url) => isRender(url) && isFull(url) && url.searchParams.get("sun.elevation_deg") === "20", () => {}); /* never answered */
 	await visit.enter("sun.elevation_deg", 20);
 	await visit.until(() => document.getElementById("stage").dataset.working === "full");
@@ -95,9 +64,7 @@ visiting("a picture at full size is given up when something changes", "", async 
 	assert.ok(visit.aborted.includes(stale), "the browser has given it up");
 });
 
-visiting("quick pictures do not queue: after the one in work comes the newest", "", async (visit) => {
-	await visit.load();
-	await visit.rests();
+check("quick pictures do not queue: after the one in work comes the newest", "", async (visit) => {
 	let release;
 	const held = new Promise((done) => (release = done));
 	await visit.page.route((url) => isRender(url) && url.searchParams.get("sun.elevation_deg") === "20", async (route) => {
@@ -109,16 +76,15 @@ visiting("quick pictures do not queue: after the one in work comes the newest", 
 	const count = visit.renders.length;
 	for (const elevation of [30, 40, 50, 60])
 		await visit.enter("sun.elevation_deg", elevation);
+	/* What is asked for by now has been told: the page answers. */
+	await visit.page.evaluate(() => new Promise(requestAnimationFrame));
 	assert.equal(visit.renders.length, count, "one is in work, the others wait");
 	release();
 	await visit.rests({ "sun.elevation_deg": 60 });
 	assert.deepEqual(visit.renders.slice(count).filter((url) => !url.includes("sun.elevation_deg=60")), [], "those between are never asked for");
 });
 
-test("a refusal is said beside the control, and is over when it is mended", async () => {
-	const visit = await Visit.open(browser, daemon);
-	await visit.load();
-	await visit.rests();
+check("a refusal is said beside the control, and is over when it is mended", "", async (visit) => {
 	await visit.tab("camera");
 	await visit.enter("camera.position_m.2", 1300);
 	await visit.until(() => !document.querySelector("[data-path='camera.position_m.2'] .wrong").hidden);
@@ -130,13 +96,10 @@ test("a refusal is said beside the control, and is over when it is mended", asyn
 	assert.ok(await visit.page.isHidden("#notice"));
 	assert.ok(await visit.page.isHidden("[data-path='camera.position_m.2'] .wrong"));
 	/* A browser reports refusals as errors of its own: these and no others. */
-	assert.deepEqual(visit.wrong.filter((text) => !text.includes("422")), []);
-	await visit.close();
+	visit.wrong = visit.wrong.filter((text) => !text.includes("422"));
 });
 
-visiting("a busy service is asked again when it says", "", async (visit) => {
-	await visit.load();
-	await visit.rests();
+check("a busy service is asked again when it says", "", async (visit) => {
 	let refused = 0;
 	await visit.page.route((url) => isRender(url) && url.searchParams.get("sun.elevation_deg") === "21", (route) =>
 		refused++ ? route.continue() : route.fulfill({ status: 503, headers: { "Retry-After": "1" }, contentType: "application/problem+json", body: `{"title":"Busy","detail":"Too much to do."}` }));
@@ -146,8 +109,7 @@ visiting("a busy service is asked again when it says", "", async (visit) => {
 	visit.wrong = visit.wrong.filter((text) => !text.includes("503"));
 });
 
-visiting("a shared address restores the scene", "#sun.elevation_deg=12.5&sun.azimuth_deg=200&clouds.wind_mps=-4,7&camera.position_m=10,20,3&radiosity.enabled=false&ground.type=snow", async (visit) => {
-	await visit.load();
+check("a shared address restores the scene", "#sun.elevation_deg=12.5&sun.azimuth_deg=200&clouds.wind_mps=-4,7&camera.position_m=10,20,3&radiosity.enabled=false&ground.type=snow", async (visit, t) => {
 	const wanted = { "sun.elevation_deg": 12.5, "sun.azimuth_deg": 200, "clouds.wind_mps": [-4, 7], "camera.position_m": [10, 20, 3], "radiosity.enabled": false, "ground.type": "snow" };
 	await visit.rests(wanted);
 	assert.equal(await visit.page.inputValue("#field-sun-elevation-deg"), "12.5");
@@ -157,25 +119,20 @@ visiting("a shared address restores the scene", "#sun.elevation_deg=12.5&sun.azi
 	const first = await visit.pixels();
 	await visit.tab("share");
 	const shared = await visit.page.inputValue("#share-address");
-	const again = await Visit.open(browser, daemon, shared.slice(shared.indexOf("#")));
-	await again.load();
+	const again = await open(t, shared.slice(shared.indexOf("#")));
 	await again.rests(wanted);
 	assert.equal(difference(first, await again.pixels()), 0, "the same scene is the same picture");
-	const answer = await fetch(`${daemon.url}/v1/render`, { method: "POST", headers: { "Content-Type": "application/json" }, body: await visit.page.inputValue("#share-json") });
+	const answer = await fetch(`${has.daemon.url}/v1/render`, { method: "POST", headers: { "Content-Type": "application/json" }, body: await visit.page.inputValue("#share-json") });
 	assert.equal(answer.status, 200);
 	assert.match(answer.headers.get("content-location"), /sun\.elevation_deg=12\.5/);
-	await again.close();
 });
 
-visiting("the address follows the scene", "", async (visit) => {
-	await visit.load();
+check("the address follows the scene", "", async (visit) => {
 	await visit.enter("sun.elevation_deg", 66);
 	await visit.until(() => location.hash.includes("sun.elevation_deg=66"));
 });
 
-visiting("the page works on a phone", "", async (visit) => {
-	await visit.load();
-	await visit.rests();
+check("the page works on a phone", "", async (visit) => {
 	const wide = await visit.page.evaluate(() => document.documentElement.scrollWidth);
 	assert.ok(wide <= 390, `nothing is wider than the screen: ${wide}`);
 	const stage = await visit.page.locator("#stage").boundingBox();

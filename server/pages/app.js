@@ -136,7 +136,10 @@ $("compare").addEventListener("change", ({ target }) => {
 	loop.changed({ afresh: true });
 });
 addEventListener("hashchange", () => location.hash !== written && scene.replace(fromQuery(location.hash.slice(1))));
-new ResizeObserver(() => loop.rest()).observe(stage.element);
+new ResizeObserver(() => {
+	if (stage.element.dataset.shows && sizes.output(scene, "full").width !== stage.canvases.picture.width)
+		loop.rest();
+}).observe(stage.element);
 new CameraHand(scene, stage, loop);
 new Probe(scene, viewer, $("stage-help"), { sun: () => dome.sun, failed });
 followTheme($("theme"));

@@ -14,7 +14,7 @@ const { chromium } = require("playwright-core");
 export const AXE = require.resolve("axe-core/axe.min.js");
 
 /** A picture is there in a tenth of a second on an idle machine; on a busy one that draws by software it may take much longer. */
-export const PATIENCE = 180000;
+export const PATIENCE = Number(process.env.PATIENCE ?? 180000);
 export const DESKTOP = { width: 1100, height: 600 };
 export const PHONE = { width: 390, height: 844 };
 
@@ -45,7 +45,7 @@ export class Daemon {
 /** Chromium will not have its sandbox as root, which is who runs tests in containers. */
 export const launch = () => chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: process.getuid() === 0 ? ["--no-sandbox"] : [] });
 
-/** A page as a person has it open: with what it asked for, what became of that, and what went wrong. */
+/** A page as a person has it open: with what it asked for and what went wrong. */
 export class Visit {
 	/** @param {import("playwright-core").Browser} browser  @param {Daemon} daemon  @param {object} [context] of playwright */
 	static async open(browser, daemon, hash = "", context = {}) {
@@ -55,11 +55,9 @@ export class Visit {
 		visit.page.setDefaultTimeout(PATIENCE);
 		visit.wrong = [];
 		visit.asked = [];
-		visit.aborted = [];
 		visit.page.on("console", (message) => message.type() === "error" && visit.wrong.push(message.text()));
 		visit.page.on("pageerror", (error) => visit.wrong.push(String(error)));
 		visit.page.on("request", (request) => visit.asked.push(request.url()));
-		visit.page.on("requestfailed", (request) => visit.aborted.push(request.url()));
 		visit.daemon = daemon;
 		visit.hash = hash;
 		return visit;

@@ -22,6 +22,7 @@ import { TimingBar } from "./panels/timing_bar.js";
 import { fromQuery, toQuery } from "./scene/address.js";
 import { FIELDS } from "./scene/fields.js";
 import { Scene } from "./scene/scene.js";
+import { inWords } from "./scene/words.js";
 import { Problem, fetchJson } from "./service/api.js";
 
 const $ = (id) => document.getElementById(id);
@@ -89,6 +90,7 @@ viewer.drawn = (drawn) => {
 	if (drawn.kind !== "full")
 		return;
 	timing.show(drawn);
+	$("picture").setAttribute("aria-label", inWords(scene, dome.sun));
 	say(`Picture of ${drawn.width} by ${drawn.height} pixels, in ${Math.round(drawn.took)} milliseconds.`);
 	if (tabs?.current === "layers")
 		layers.follow();

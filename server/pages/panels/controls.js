@@ -114,7 +114,7 @@ function setWrong(row, detail) {
 	line.hidden = !detail;
 	row.classList.toggle("bad", Boolean(detail));
 	for (const input of row.querySelectorAll("input, select")) {
-		input.toggleAttribute("aria-invalid", Boolean(detail));
+		input.setAttribute("aria-invalid", String(Boolean(detail)));
 		if (detail)
 			input.setAttribute("aria-describedby", line.id);
 		else

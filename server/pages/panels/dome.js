@@ -1,11 +1,11 @@
 /** The sky from above, the zenith in the middle: the sun to be dragged, what the camera sees, and the way of the sun over the day. */
 import { line, svg } from "../figures/svg.js";
 import { directionAt } from "../scene/direction.js";
+import { compassPoint } from "../scene/words.js";
 
 /** Radius of the horizon; a degree has the same length above and below it. */
 const HORIZON = 100;
 const DEEPEST = -18;
-const POINTS = ["north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"];
 const rad = Math.PI / 180;
 
 function place(azimuth, elevation) {
@@ -64,9 +64,8 @@ export class Dome {
 		this.sun = sun;
 		const [x, y] = place(sun.azimuth, sun.elevation);
 		this.handle.setAttribute("transform", `translate(${x.toFixed(1)} ${y.toFixed(1)})`);
-		const towards = POINTS[Math.round(sun.azimuth / 45) % 8];
 		this.handle.setAttribute("aria-valuenow", sun.elevation.toFixed(1));
-		this.handle.setAttribute("aria-valuetext", `elevation ${sun.elevation.toFixed(1)}°, azimuth ${sun.azimuth.toFixed(1)}°, ${towards}`);
+		this.handle.setAttribute("aria-valuetext", `elevation ${sun.elevation.toFixed(1)}°, azimuth ${sun.azimuth.toFixed(1)}°, ${compassPoint(sun.azimuth)}`);
 		this.figure.dataset.light = sun.elevation > 12 ? "day" : sun.elevation > -3 ? "low" : "night";
 	}
 

@@ -8,11 +8,11 @@ const VARIANTS = {
 	radiosity: { names: ["With light from the ground", "Without"], change: (m) => laid(m, "radiosity", { enabled: false }) },
 	clear: { names: ["Clouds", "Clear sky"], change: (m) => ({ ...m, clouds: { type: "none" } }) },
 	reference: {
-		names: ["Real time", "Reference, 16 paths a pixel"],
+		names: ["Real time", "Reference, path traced"],
 		change: (m) => {
-			const width = Math.min(m.output.width, 480);
+			const width = Math.min(m.output.width, 320);
 			const output = { ...m.output, width, ...(m.output.height && { height: Math.round((width * m.output.height) / m.output.width) }) };
-			return { ...m, output, model: { name: "reference", samples: 16 }, radiosity: undefined };
+			return { ...m, output, model: { name: "reference", samples: 32, partial: true }, radiosity: undefined };
 		},
 	},
 };

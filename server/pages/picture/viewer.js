@@ -9,9 +9,11 @@ import { develop } from "./develop.js";
 /** Scene light, as small as a browser can read it without ado. */
 const LIGHT = { format: "exr", exr_type: "half", exr_compression: "none" };
 
+const takesLong = (members) => members.model?.name === "reference";
+
 /** The same scene by a model that is done in time. */
 function inTime(members) {
-	if (members.model?.name !== "reference")
+	if (!takesLong(members))
 		return members;
 	const { name, samples, time_budget_ms, seed, partial, ...model } = members.model;
 	return { ...members, model };
@@ -48,8 +50,9 @@ export class Viewer {
 			const more = this.layer === "color" ? {} : { ...LIGHT, layers: [this.layer] };
 			const members = this.#ask(kind, more);
 			const drawn = await this.#drawPane("picture", members, kind, signal);
-			if (this.other)
-				await this.#drawPane("other", this.other(members), kind, signal);
+			const other = this.other?.(members);
+			if (other && !(kind === "quick" && takesLong(other)))
+				await this.#drawPane("other", other, kind, signal);
 			this.drawn({ kind, ...drawn });
 		} finally {
 			this.stage.working(null);

@@ -38,14 +38,17 @@ const timing = new TimingBar($("timing"));
 const dome = new Dome(scene, $("dome"), loop);
 const sun = new SunPlace(scene, dome, $("panel-sun"));
 const droplets = new Droplets(scene, $("panel-droplets"));
-const exposure = new Exposure(scene, viewer, document.querySelector(".exposure"), { failed });
+const exposure = new Exposure(scene, viewer, document.querySelector(".exposure"), loop, failed);
 const share = new Share(scene, $("panel-share"), { say, failed });
 const layers = new LayersPanel(scene, $("layers"), chooseLayer);
 const presets = new Presets($("presets"), choosePreset, () => stage.element.dataset.working === "" && !animation.playing);
 const animation = new Animation(scene, document.querySelector(".play"), {
 	draw: (signal) => viewer.draw("quick", signal),
 	begin: () => loop.hold(),
-	end: () => loop.release(),
+	end: () => {
+		loop.release();
+		loop.outgrown();
+	},
 	place: () => sun.begin(),
 	failed,
 });
@@ -140,7 +143,7 @@ $("compare").addEventListener("change", ({ target }) => {
 addEventListener("hashchange", () => location.hash !== written && scene.replace(fromQuery(location.hash.slice(1))));
 new ResizeObserver(() => {
 	if (stage.element.dataset.shows && sizes.output(scene, "full").width !== stage.canvases.picture.width)
-		loop.rest();
+		loop.outgrown();
 }).observe(stage.element);
 new CameraHand(scene, stage, loop);
 new Probe(scene, viewer, $("stage-help"), { sun: () => dome.sun, failed });

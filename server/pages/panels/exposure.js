@@ -13,9 +13,10 @@ export class Exposure {
 	 * @param {import("../scene/scene.js").Scene} scene
 	 * @param {import("../picture/viewer.js").Viewer} viewer
 	 * @param {HTMLElement} bar
-	 * @param {{changed: () => void, failed: (error: Error) => void}} loop  changed: where there is no light to develop
+	 * @param {import("../picture/loop.js").RenderLoop} loop
+	 * @param {(error: Error) => void} failed
 	 */
-	constructor(scene, viewer, bar, loop) {
+	constructor(scene, viewer, bar, loop, failed) {
 		this.scene = scene;
 		this.viewer = viewer;
 		this.loop = loop;
@@ -24,11 +25,10 @@ export class Exposure {
 		this.shown = bar.querySelector("#exposure-value");
 		Object.assign(this.slider, { min: FIELD.low, max: FIELD.high, step: FIELD.step });
 		this.light = latest(async (_, signal) => {
-			const exr = await viewer.fetchLight(signal);
-			signal.throwIfAborted();
-			this.automatic = exr.header["stratus:exposure_ev"];
-			this.#develop();
-		}, loop.failed);
+			await viewer.fetchLight(signal);
+			if (loop.rests)
+				viewer.developLight();
+		}, failed);
 		this.auto.addEventListener("change", () => this.#switch());
 		this.slider.addEventListener("input", () => this.scene.set({ "output.exposure_ev": Number(this.slider.value) }, { moving: true }));
 		this.#follow();
@@ -66,7 +66,7 @@ export class Exposure {
 	takes(paths) {
 		const mine = (path) => path === "output.exposure_ev" || path === "output.tone";
 		this.#follow();
-		if (!paths?.size || ![...paths].every(mine) || this.viewer.layer !== "color" || this.viewer.other)
+		if (!paths?.size || ![...paths].every(mine) || !this.loop.rests || this.viewer.layer !== "color" || this.viewer.other)
 			return false;
 		this.#develop();
 		return true;
@@ -74,6 +74,6 @@ export class Exposure {
 
 	#develop() {
 		cancelAnimationFrame(this.#frame);
-		this.#frame = requestAnimationFrame(() => this.viewer.developLight() || this.light.want(null));
+		this.#frame = requestAnimationFrame(() => this.loop.rests && (this.viewer.developLight() || this.light.want(null)));
 	}
 }

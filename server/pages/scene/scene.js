@@ -45,7 +45,7 @@ export class Scene extends EventTarget {
 		const changed = Object.keys(values).filter((path) => !same(this.value(path), values[path]));
 		for (const path of changed)
 			this.#put(path, values[path]);
-		if (changed.length || !moving)
+		if (changed.length)
 			this.dispatchEvent(new CustomEvent("change", { detail: { paths: new Set(changed), moving } }));
 	}
 

@@ -1,5 +1,6 @@
 # make run    installs what is missing, builds, starts the daemon
 # make test   installs what tests need, builds, runs all tests
+# make web-test   tests the web page in Chromium; make test does so too where a browser and npm packages can be had
 # make demo   four pictures into out/, with their timings
 # make validate   measures the bounds of optics and radiosity and draws the paper's figures into docs/validation/, some minutes
 # make judge   measures the slab against its reference over 24 scenes and writes docs/judge, some 20 minutes; goes on where it was stopped
@@ -35,6 +36,8 @@ PACKAGES := gcc g++ libc6-dev pkg-config libepoxy-dev libegl-dev libegl1 libegl-
 	zlib1g-dev libpng-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libjansson-dev libnova-dev nettle-dev libxxhash-dev libcminpack-dev libcurl4-openssl-dev ca-certificates curl
 TEST_PACKAGES := libcmocka-dev libglm-dev python3 python3-pytest python3-numpy python3-openimageio python3-yaml openexr openssl clang-format procps \
 	python3-prometheus-client mandoc systemd ffmpeg gnuplot-nox
+# The page's tests need a browser, and Node.js with npm for playwright-core and axe-core, unless those are there from elsewhere.
+WEB_PACKAGES := chromium fonts-dejavu-core $(if $(shell command -v node),,nodejs) $(if $(shell command -v npm),,npm)
 VALIDATE_PACKAGES := gnuplot-nox
 GALLERY_PACKAGES := imagemagick
 FUZZ_PACKAGES := clang llvm
@@ -53,14 +56,14 @@ UNIT_SRC := $(wildcard tests/unit/test_*.c)
 VALIDATE_SRC := $(wildcard tests/validate/*.c)
 UNIT_CXX := $(wildcard tests/unit/test_*.cpp)
 SHADERS := $(wildcard shaders/*.glsl shaders/*/*.glsl)
-RESOURCES := openapi.yaml server/pages/index.html $(wildcard server/presets/*.json)
+RESOURCES := openapi.yaml $(wildcard server/pages/*.* server/pages/*/*.* server/presets/*.json)
 
 obj = $(patsubst %,$(B)/%.o,$(1))
 RENDERER_OBJ := $(call obj,$(RENDERER_SRC)) $(B)/gen/shaders.o
 PROGRAMS := $(B)/stratusd $(B)/stratus $(B)/stratus-kernel $(B)/render-bench
 UNIT := $(patsubst tests/unit/%.c,$(B)/tests/%,$(UNIT_SRC)) $(patsubst tests/unit/%.cpp,$(B)/tests/%,$(UNIT_CXX))
 
-.PHONY: all programs kernel man install uninstall image run test fuzz replays load soak demo gallery validate judge golden scene-classes unit http format clean packages test-packages
+.PHONY: all programs kernel man install uninstall image run test fuzz replays load soak demo gallery validate judge golden scene-classes unit http format clean packages test-packages web-packages web-test
 all: programs kernel
 programs: $(PROGRAMS) $(B)/stratus-image.so
 
@@ -221,6 +224,7 @@ demo: packages
 	@scripts/demo.sh $(B)
 
 test: test-packages
+	-@scripts/packages.sh $(WEB_PACKAGES)
 	@$(MAKE) --no-print-directory -j$$(nproc) programs unit replays && $(MAKE) --no-print-directory kernel
 	@scripts/test.sh $(B)
 
@@ -250,6 +254,12 @@ gallery: packages
 	@scripts/packages.sh $(GALLERY_PACKAGES)
 	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel
 	@scripts/gallery.sh $(B) $(PICTURES)
+
+web-packages: packages
+	@scripts/packages.sh $(WEB_PACKAGES)
+web-test: web-packages
+	@$(MAKE) --no-print-directory -j$$(nproc) $(B)/stratusd $(B)/stratus-image.so && $(MAKE) --no-print-directory kernel
+	@scripts/web.sh $(B)
 
 validate: packages
 	@scripts/packages.sh $(VALIDATE_PACKAGES)

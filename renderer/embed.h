@@ -12,7 +12,7 @@ struct embedded_file {
 };
 
 extern const struct embedded_file shader_files[];   /* shaders/...glsl */
-extern const struct embedded_file resource_files[]; /* openapi.yaml, server/presets/...json */
+extern const struct embedded_file resource_files[]; /* openapi.yaml, server/pages/..., server/presets/...json */
 
 static inline const struct embedded_file *embedded_find(const struct embedded_file *table, const char *name)
 {

@@ -112,6 +112,15 @@ build_sanitized() {
 	make --no-print-directory -j"$(nproc)" SAN=address,undefined WITHOUT="$measures" programs unit replays
 }
 
+# The page in a browser; its last line counts, and says when there is no browser or no npm registry.
+run_web() {
+	local log=$results/web counts
+	scripts/web.sh "$B" 2>&1 | tee "$log"
+	counts=$(sed -n '$s/^\([0-9]*\) passed, \([0-9]*\) failed, [0-9]* skipped$/\1 \2/p' "$log")
+	# shellcheck disable=SC2086
+	count ${counts:-0 1}
+}
+
 # The same programs built with sanitizers, in a process of its own whose last line is its count.
 run_sanitized() {
 	local log=$results/sanitized counts
@@ -159,6 +168,7 @@ if [ -n "$SAN" ]; then
 else
 	run_pytest tests/http tests/client
 	run_pytest tests/ops
+	run_web
 	run_format
 fi
 wait $programs

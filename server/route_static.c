@@ -1,4 +1,4 @@
-/* What the binary carries: the page at /, the contract, the presets; and the answers for paths where nothing is. */
+/* What the binary carries for programs: the contract, the presets; and the answers for paths where nothing is. */
 #include "server/routes.h"
 
 #include "renderer/embed.h"
@@ -12,11 +12,6 @@ static enum MHD_Result send_resource(struct request *request, const char *name, 
 {
 	const struct embedded_file *file = embedded_find(resource_files, name);
 	return response_send_document(request, file ? strndup(file->data, file->size) : NULL, content_type, CACHE_KEEP);
-}
-
-enum MHD_Result route_index(struct request *request)
-{
-	return send_resource(request, "server/pages/index.html", "text/html; charset=utf-8");
 }
 
 enum MHD_Result route_openapi(struct request *request)

@@ -13,6 +13,7 @@ static const struct route routes[] = {
 	{ROUTE_ASSET_PREFIX, "GET, HEAD, PUT, DELETE", route_asset, ROUTE_ASSET},
 	{"/v1/presets", "GET, HEAD", route_presets, ROUTE_PRESETS},
 	{"/", "GET, HEAD", route_index, ROUTE_INDEX},
+	{ROUTE_PAGE_PREFIX, "GET, HEAD", route_page, ROUTE_INDEX},
 	{"/openapi.yaml", "GET, HEAD", route_openapi, ROUTE_OPENAPI},
 	{"/healthz", "GET, HEAD", route_healthz, ROUTE_HEALTHZ},
 	{"/readyz", "GET, HEAD", route_readyz, ROUTE_READYZ},

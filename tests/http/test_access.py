@@ -151,7 +151,7 @@ def test_caches_give_nothing_to_strangers(guarded, keys, daemon):
 
 
 def test_what_needs_none(guarded):
-    for target in ("/", "/openapi.yaml", "/healthz", "/readyz"):
+    for target in ("/", "/web/app.js", "/openapi.yaml", "/healthz", "/readyz"):
         assert guarded.get(target).status == 200, target
     assert_problem(guarded.get("/nowhere"), 404, "not-found")
 

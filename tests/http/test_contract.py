@@ -164,6 +164,7 @@ def assert_conforms(value, schema, place=""):
 
 
 EXAMPLES = {
+    "/web/{file}": "/web/app.js",
     "/v1/assets/{name}": "/v1/assets/example",
     "/v1/slab": "/v1/slab?optical_thickness=8&sun_zenith_deg=60",
     "/v1/sun": "/v1/sun?time=2024-06-21T12:00:00Z&latitude_deg=48&longitude_deg=11",

@@ -1,0 +1,65 @@
+/** Frames one after the other, each asked for when the one before it is there: clouds that drift, or the sun over a day. */
+import { later } from "./sun_place.js";
+
+const SHORTEST_MS = 60;
+
+export class Animation {
+	/** @type {AbortController | null} */
+	#playing = null;
+
+	/**
+	 * @param {import("../scene/scene.js").Scene} scene
+	 * @param {HTMLElement} bar
+	 * @param {{draw: (signal: AbortSignal) => Promise<void>, begin: () => void, end: () => void, failed: (error: Error) => void, place: () => void}} stage
+	 */
+	constructor(scene, bar, stage) {
+		this.scene = scene;
+		this.stage = stage;
+		this.button = bar.querySelector("#play");
+		this.what = bar.querySelector("#play-what");
+		this.button.addEventListener("click", () => (this.#playing ? this.stop() : this.play()));
+	}
+
+	get playing() {
+		return this.#playing !== null;
+	}
+
+	#step() {
+		const [what, by] = this.what.value.split(":");
+		if (what === "sun")
+			this.scene.set({ "sun.time": later(this.scene.value("sun.time"), Number(by)) }, { moving: true });
+		else
+			this.scene.set({ "clouds.time_s": (this.scene.value("clouds.time_s") + Number(by)) % 1e7 }, { moving: true });
+	}
+
+	async play() {
+		const { signal } = (this.#playing = new AbortController());
+		this.#look(true);
+		this.stage.begin();
+		if (this.what.value.startsWith("sun"))
+			this.stage.place();
+		try {
+			while (!signal.aborted) {
+				const began = performance.now();
+				this.#step();
+				await this.stage.draw(signal);
+				await new Promise((done) => setTimeout(done, Math.max(SHORTEST_MS - (performance.now() - began), 0)));
+			}
+		} catch (error) {
+			if (!signal.aborted)
+				this.stage.failed(error);
+		}
+		this.#playing = null;
+		this.#look(false);
+		this.stage.end();
+	}
+
+	stop() {
+		this.#playing?.abort();
+	}
+
+	#look(playing) {
+		this.button.setAttribute("aria-pressed", String(playing));
+		this.button.querySelector(".word").textContent = playing ? "Pause" : "Play";
+	}
+}

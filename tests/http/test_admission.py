@@ -44,10 +44,13 @@ def served(tmp_path_factory):
     daemon.assert_clean()
 
 
+seeds = itertools.count(10000)  # no two alike, which would share one render
+
+
 def queued(daemon, count, width=4096):
     """So many large pictures in line, all of the one client: their sockets. The renderer is to be held; none of them need ever be rendered."""
     before = daemon.metric("stratus_queue_depth")
-    clients = [send(daemon, picture(300 + i, width, width * 3 // 4)) for i in range(count)]
+    clients = [send(daemon, picture(next(seeds), width, width * 3 // 4)) for _ in range(count)]
     assert wait_for(lambda: daemon.metric("stratus_queue_depth") == before + count)
     return clients
 

@@ -43,6 +43,7 @@ struct compare_run {
 struct compare_work {
 	struct work compare;
 	struct request *request;
+	struct promise promise;
 	struct compare_query query;
 	enum compare_form form;
 	struct scene mask_scene;
@@ -59,6 +60,7 @@ struct compare_work {
 static void work_destroy(void *context)
 {
 	struct compare_work *work = context;
+	admission_leave(work->request->service, &work->promise, false);
 	for (int i = 0; i < RUNS_MAX; i++) {
 		frame_finish(&work->run[i].job.frame);
 		if (work->run[i].scene)
@@ -167,12 +169,14 @@ static enum MHD_Result finish(struct request *request)
 
 static void hand_back(struct compare_work *work)
 {
+	admission_leave(work->request->service, &work->promise, work->ended->outcome == RENDER_OUTCOME_OK);
 	call_end_render(work->request, work->ended);
 }
 
 static void refuse(struct compare_work *work)
 {
 	work->refused = true;
+	admission_leave(work->request->service, &work->promise, false);
 	request_resume(work->request);
 }
 
@@ -235,6 +239,8 @@ static void compare(struct work *base)
 	if (work->ended->outcome == RENDER_OUTCOME_OK)
 		job_is_over(work->ended);
 	comparison_finish(&comparison);
+	for (int i = 0; i < RUNS_MAX; i++)
+		frame_drop_pixels(&work->run[i].job.frame);
 	admission_keep(work->request, work->answer.size);
 	hand_back(work);
 }
@@ -338,7 +344,7 @@ static bool enter(struct compare_work *work)
 	const struct scene *scenes[RUNS_MAX];
 	for (int i = 0; i < work->run_count; i++)
 		scenes[i] = work->run[work->order[i]].scene;
-	return admission_enter(work->request, scenes, work->run_count, NULL, work->deadline_ms);
+	return admission_enter(work->request, &work->promise, scenes, work->run_count, NULL, work->deadline_ms);
 }
 
 enum MHD_Result route_compare(struct request *request)

@@ -38,6 +38,7 @@ struct render_work {
 	struct request *request; /* no longer, for other threads, once its seat is left */
 	struct flight_seat seat;
 	struct flight flight;
+	struct promise promise;
 	struct render_job job; /* for the render thread */
 	struct work decode;    /* for the decoder, when a map is not in memory */
 	struct work encode;    /* for the worker */
@@ -59,6 +60,8 @@ static void work_release(void *context)
 	struct render_work *work = context;
 	if (--work->holders > 0)
 		return;
+	if (work->service)
+		admission_leave(work->service, &work->promise, false);
 	finished_image_release(work->seat.image);
 	frame_finish(&work->job.frame);
 	scene_assets_finish(&work->input.scene, &work->assets);
@@ -191,7 +194,6 @@ static struct MHD_Response *create_response(struct request *request)
 	struct render_work *work = request->work;
 	struct finished_image *image = work->seat.image;
 	work->seat.image = NULL;
-	admission_keep(request, image->size);
 	metrics_count_picture(request->service->metrics, image->pixels);
 	return response_create_shared(request, image);
 }
@@ -236,6 +238,7 @@ static enum MHD_Result finish(struct request *request)
 	timings_add(&request->timings, TIMING_FIELD, work->decode_ms[0]);
 	timings_add(&request->timings, TIMING_SKY, work->decode_ms[1]); /* the ground is part of it */
 	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
+	admission_keep(request, seat->image->size);
 	struct MHD_Response *response = create_response(request);
 	set_samples(response, work->job.frame.samples, work->job.frame.partial);
 	set_cache_status(response, work);
@@ -294,6 +297,7 @@ static void arrive(struct render_work *work, enum render_outcome outcome, struct
 {
 	work->job.outcome = outcome;
 	call_count_render(work->service, &work->job);
+	admission_leave(work->service, &work->promise, image != NULL); /* before those who wait may come again */
 	flight_arrive(&work->flight, outcome, image);
 	finished_image_release(image);
 	end_work(work);
@@ -356,6 +360,7 @@ static void on_rendered(struct render_job *job)
 /* Ends the job that a full queue refused. */
 static void refuse(struct render_work *work)
 {
+	admission_leave(work->service, &work->promise, false);
 	flight_refuse(&work->flight);
 	end_work(work);
 }
@@ -390,7 +395,7 @@ static void start(struct render_work *work)
 	struct service *service = work->service;
 	struct request *request = work->request;
 	work->holders++;
-	if (!admission_enter(request, &work->job.scene, 1, NULL, work->seat.deadline_ms)) {
+	if (!admission_enter(request, &work->promise, &work->job.scene, 1, NULL, work->seat.deadline_ms)) {
 		refuse(work);
 		return;
 	}

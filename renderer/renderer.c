@@ -579,13 +579,20 @@ static bool is_cancelled(const struct job *job)
 	return job->cancelled && !has_samples(job) && job->cancelled(job->cancel_context);
 }
 
+/* Of a stage that could not do its work. */
+static enum render_result result_of_fault(void)
+{
+	const bool no_program = pass_was_refused();
+	return gl_lost() ? RENDER_FAILED : no_program ? RENDER_NO_PROGRAM : RENDER_OUT_OF_MEMORY;
+}
+
 static enum render_result result_of_failure(const struct job *job)
 {
 	if (job->unfinished)
 		return RENDER_UNFINISHED;
 	if (job->cancelled && job->cancelled(job->cancel_context))
 		return RENDER_CANCELLED;
-	return gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+	return result_of_fault();
 }
 
 /* The timers that ran go with the picture; those of the last one that went this way are for the next. */
@@ -685,6 +692,7 @@ enum render_result renderer_start(struct renderer *renderer, const struct scene 
 		renderer_drop_pending(pending);
 		return RENDER_OUT_OF_MEMORY;
 	}
+	pass_was_refused(); /* nor does that of another picture count */
 	cache_begin_frame(renderer->context.cache);
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
 	view_fill_block(&renderer->context.block, scene);
@@ -775,7 +783,7 @@ static enum render_result run_sky_light(struct renderer *renderer, const struct 
 			sky_stage_run_directions(&renderer->sky, context, scene, ground.mean, directions, light);
 	if (gl_failed("sky light") && !gl_failed_for_memory())
 		return RENDER_FAILED;
-	return ok ? RENDER_OK : gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+	return ok ? RENDER_OK : result_of_fault();
 }
 
 enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,

@@ -4,9 +4,9 @@
  * A service time is what passes between two answers while there is enough to do. The number of places alone would not bound the wait, since
  * some pictures take more than others. So when a quarter of them is taken the others are given by time: to whoever would be answered soon
  * enough, as far as can be foreseen from what is done before the last of its client (fair_order.h) and from a margin, by which fewer than
- * one in a hundred of the answers of late took longer than that: for themselves, for those that came later and went first, for encoding, and
- * for errors of prediction. What a picture itself takes plays no part, since otherwise cheap ones would keep dear ones out for ever. Until
- * enough was measured the number alone counts. Any thread.
+ * one in a hundred of the answers of late took longer than that: for themselves, for those that came later and went first, for encoding,
+ * and for errors of prediction. What a picture itself takes plays no part, since otherwise cheap ones would keep dear ones out for ever.
+ * Until enough was measured the number alone counts. Any thread.
  */
 #ifndef STRATUS_SERVER_INTAKE_H
 #define STRATUS_SERVER_INTAKE_H

@@ -223,6 +223,25 @@ def test_no_memory_on_the_host(faulty):
     assert faulty.render(scene).status == 200
 
 
+# --- a shader that is compiled when it is needed ---------------------------------------------------------------------------------------
+
+
+def test_a_shader_that_does_not_compile(faulty):
+    """Pictures that take it are answered 500, not that there is no memory; the log names it, and no renderer is made anew for it."""
+    scene = {"camera": {"projection": "fisheye"}, "model": {"shading": "paper"}, "output": {"width": 48, "height": 48}}
+    resets, before = faulty.resets("failures"), len(faulty.text)
+    for seed in range(4):  # one more than failures on end that have the renderer made anew
+        faulty.fail("shader")
+        answer = faulty.render({**scene, "clouds": {"seed": 5000 + seed}})
+        assert faulty.has_failed("shader")
+        assert (answer.status, answer.json["type"]) == (500, "urn:stratus:problem:render-failed")
+    lines = faulty.text[before:].splitlines()
+    assert sum(bool(re.search(r" error +gl: compiling shaders/passes/[a-z_]+\.glsl failed", line)) for line in lines) == 4, lines
+    assert not any("out of memory" in line for line in lines)
+    assert faulty.render(scene).status == 200
+    assert faulty.resets("failures") == resets
+
+
 # --- the golden render ---------------------------------------------------------------------------------------------------------------
 
 

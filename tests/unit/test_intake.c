@@ -103,8 +103,8 @@ static void places_are_given_by_time(void **state)
 
 /* --- an overload ------------------------------------------------------------------------------------------------------------------- */
 
-/* Requests of one client at random times, for pictures of three kinds, one of which takes three times as long as the others; predicted badly;
- * rendered one after the other in fair order, then encoded. The mix of tests/load. */
+/* Requests of one client at random times, for pictures of three kinds, one of which takes three times as long as the others; predicted
+ * badly; rendered one after the other in fair order, then encoded. The mix of tests/load. */
 enum { WEIGHTS = 9, ENCODE_MS = 10, ANSWERS_MAX = 20000 };
 static const double cost_of_kind[WEIGHTS] = {20, 20, 20, 20, 20, 20, 25, 25, 70};
 static const double mean_ms = 240.0 / WEIGHTS;
@@ -143,7 +143,9 @@ static void come(struct world *world, double rate)
 {
 	struct picture *picture = calloc(1, sizeof *picture);
 	const double cost_ms = cost_of_kind[(int)(WEIGHTS * draw(world))];
-	const double left_ms = world->running ? fmax(world->running->entry.cost_ms - (world->now_ms - world->rendered_ms + world->running->true_ms), 0) : 0;
+	const double left_ms =
+		world->running ? fmax(world->running->entry.cost_ms - (world->now_ms - world->rendered_ms + world->running->true_ms), 0)
+			       : 0;
 	double late_ms;
 	world->comes_ms = world->now_ms - log(draw(world)) * mean_ms / rate;
 	*picture = (struct picture){.came_ms = world->now_ms, .true_ms = cost_ms * (0.9 + 0.2 * draw(world))};

@@ -1,6 +1,8 @@
 """The proofs under load judge rightly: what they are told of is made up here."""
 import copy
+import datetime
 import importlib.util
+import json
 
 import pytest
 
@@ -74,3 +76,57 @@ def test_bounds_that_are_broken(load, offered, change, word):
         found[offered].update(change)
     found = broken(load, rounds)
     assert len(found) == 1 and word in found[0], found
+
+
+# --- make soak -----------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def soak(monkeypatch):
+    return load_module(TESTS / "soak" / "soak.py", "build", monkeypatch=monkeypatch)
+
+
+NOON = datetime.datetime(2026, 6, 1, 12, tzinfo=datetime.timezone.utc)
+
+
+def line(ended_s, duration_s, status, problem=None, scene="a"):
+    """Of a request that ended so many seconds after noon."""
+    time = (NOON + datetime.timedelta(seconds=ended_s)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    entry = {"time": time, "event": "request", "id": f"{ended_s}", "status": status, "duration_ms": 1000 * duration_s, "scene": scene}
+    return json.dumps({**entry, "problem": problem} if problem else entry)
+
+
+def unexplained(soak, lines, *faults):
+    """faults: (name, seconds after noon at which it struck, or None)."""
+    made = [soak.Fault(name, at if at is None else (NOON.timestamp() + at - 0.05, NOON.timestamp() + at)) for name, at in faults]
+    return len(soak.unexplained(lines, made)[0])
+
+
+def test_a_picture_is_given_up_for_a_fault_of_its_kind(soak):
+    failed = line(10, 2, 500, "render-failed")
+    assert unexplained(soak, [failed], ("gl-error", 9)) == 0
+    assert unexplained(soak, [failed]) == unexplained(soak, [failed], ("gl-error", None)) == 1
+    assert unexplained(soak, [failed], ("gl-memory", 9), ("gl-reset", 9), ("host-memory", 9)) == 1
+    assert unexplained(soak, [failed], ("gl-error", 7)) == unexplained(soak, [failed], ("gl-error", 11)) == 1
+    assert unexplained(soak, [line(10, 2, 503, "no-memory")], ("gl-memory", 9)) == 0
+    assert unexplained(soak, [line(10, 2, 503, "no-memory")], ("gl-error", 9)) == 1
+
+
+def test_a_fault_gives_up_one_picture(soak):
+    first, other = line(10, 2, 500, "render-failed"), line(10.2, 2, 500, "render-failed", scene="b")
+    assert unexplained(soak, [first, other], ("gl-error", 9)) == 1
+    assert unexplained(soak, [first, other], ("gl-error", 9), ("gl-error", 9.5)) == 0
+    assert unexplained(soak, [first, first], ("gl-error", 9)) == 0  # two had waited for one picture
+
+
+def test_delays_follow_faults(soak):
+    late = line(40, 5, 504, "deadline-passed")
+    assert unexplained(soak, [late], ("gone", 20)) == 0
+    assert unexplained(soak, [late], ("gone", 4)) == unexplained(soak, [late], ("gone", 41)) == 1
+    assert unexplained(soak, [line(40, 5, 503, "renderer-unavailable")], ("gone", 39)) == 1  # it comes back
+
+
+def test_what_is_no_failure(soak):
+    assert unexplained(soak, [line(10, 1, 200), line(10, 1, 422, "invalid"), line(10, 1, 499), '{"level":"error","message":"gl: error"}']) == 0
+    assert unexplained(soak, ["Segmentation fault"]) == 1
+    assert unexplained(soak, [line(10, 1, 500, "internal")], ("gl-error", 9.5)) == 1

@@ -579,18 +579,25 @@ static bool is_cancelled(const struct job *job)
 	return job->cancelled && !has_samples(job) && job->cancelled(job->cancel_context);
 }
 
+/* Those of another picture do not count. */
+static void forget_faults(void)
+{
+	pass_was_refused();
+	gl_failed_otherwise();
+}
+
 /* Of a stage that could not do its work. */
 static enum render_result result_of_fault(void)
 {
-	const bool no_program = pass_was_refused();
-	return gl_lost() ? RENDER_FAILED : no_program ? RENDER_NO_PROGRAM : RENDER_OUT_OF_MEMORY;
+	const bool no_program = pass_was_refused(), failed = gl_failed_otherwise();
+	return gl_lost() ? RENDER_FAILED : no_program ? RENDER_NO_PROGRAM : failed ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
 }
 
 static enum render_result result_of_failure(const struct job *job)
 {
 	if (job->unfinished)
 		return RENDER_UNFINISHED;
-	if (job->cancelled && job->cancelled(job->cancel_context))
+	if (job->renderer->context.stopped || (job->cancelled && job->cancelled(job->cancel_context)))
 		return RENDER_CANCELLED;
 	return result_of_fault();
 }
@@ -603,6 +610,19 @@ static void depart(struct renderer *renderer, struct transfer *transfer)
 	memcpy(transfer->timers, renderer->timers, sizeof kept);
 	memcpy(renderer->timers, kept, sizeof kept);
 	readback_send(transfer->slot);
+}
+
+static bool job_is_cancelled(void *context)
+{
+	return is_cancelled(context);
+}
+
+/* Whom the stages ask between their passes; NULL: nobody. */
+static void set_cancelled(struct renderer *renderer, renderer_cancelled *cancelled, void *context)
+{
+	renderer->context.cancelled = cancelled;
+	renderer->context.cancel_context = context;
+	renderer->context.stopped = false;
 }
 
 static enum render_result run_stages(struct job *job)
@@ -692,7 +712,7 @@ enum render_result renderer_start(struct renderer *renderer, const struct scene 
 		renderer_drop_pending(pending);
 		return RENDER_OUT_OF_MEMORY;
 	}
-	pass_was_refused(); /* nor does that of another picture count */
+	forget_faults();
 	cache_begin_frame(renderer->context.cache);
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
 	view_fill_block(&renderer->context.block, scene);
@@ -702,7 +722,9 @@ enum render_result renderer_start(struct renderer *renderer, const struct scene 
 	renderer->context.block.cloud_layer[1] = (float)scene->clouds.thickness_m;
 	renderer->context.block.cloud_layer[3] = scene->clouds.type != CLOUD_NONE && scene->clouds.thickness_m > 0;
 
+	set_cancelled(renderer, cancelled ? job_is_cancelled : NULL, &job);
 	const enum render_result result = run_stages(&job);
+	set_cancelled(renderer, NULL, NULL);
 	add_spent(&job);
 	settle_pending(&job, result);
 	frame->radiosity_passes = job.light.passes;
@@ -783,7 +805,7 @@ static enum render_result run_sky_light(struct renderer *renderer, const struct 
 			sky_stage_run_directions(&renderer->sky, context, scene, ground.mean, directions, light);
 	if (gl_failed("sky light") && !gl_failed_for_memory())
 		return RENDER_FAILED;
-	return ok ? RENDER_OK : result_of_fault();
+	return ok ? RENDER_OK : context->stopped ? RENDER_CANCELLED : result_of_fault();
 }
 
 enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
@@ -794,13 +816,16 @@ enum render_result renderer_sky_light(struct renderer *renderer, const struct sc
 	*light = (struct sky_light){0};
 	if (cancelled && cancelled(context))
 		return RENDER_CANCELLED;
+	forget_faults();
 	cache_begin_frame(renderer->context.cache);
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
 	view_fill_block(&renderer->context.block, &clear);
 	renderer->context.reused = true;
 	cache_set_owner(renderer->context.cache, STAGE_SKY);
 	gl_timer_begin(&renderer->timers[STAGE_SKY]);
+	set_cancelled(renderer, cancelled, context);
 	enum render_result result = run_sky_light(renderer, &clear, directions, light);
+	set_cancelled(renderer, NULL, NULL);
 	gl_timer_end(&renderer->timers[STAGE_SKY]);
 	light->timing = (struct stage_timing){gl_timer_milliseconds(&renderer->timers[STAGE_SKY]), false};
 	if (result == RENDER_OK && cancelled && cancelled(context))

@@ -306,7 +306,7 @@ static void write_queue(struct text *text, const struct metrics *metrics, const 
 	write_family(text, "renders_ended", "counter", "Accepted renders that brought no picture, by reason.");
 	for (int i = 0; i < END_COUNT; i++)
 		text_printf(text, "stratus_renders_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->ended[i]);
-	write_family(text, "wasted_render_seconds", "counter", "Time of the renderer on those, by reason.");
+	write_family(text, "wasted_render_seconds", "counter", "Time of the renderer and of encoders on those, by reason.");
 	for (int i = 0; i < END_COUNT; i++)
 		text_printf(text, "stratus_wasted_render_seconds_total{reason=\"%s\"} %.3f\n", end_names[i], metrics->wasted_ms[i] * 1e-3);
 	write_family(text, "cancelled", "counter", "Those of them that nobody waited for any more, by how far they had come.");

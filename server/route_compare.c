@@ -193,6 +193,7 @@ static bool job_is_over(void *context)
 static bool encode(struct compare_work *work, const struct comparison *comparison)
 {
 	const struct image_api *images = work->request->service->images;
+	const struct image_watch watch = {job_is_over, work->ended};
 	char error[256] = "out of memory";
 	char *json = comparison_to_json(comparison);
 	bool ok = json != NULL;
@@ -200,9 +201,9 @@ static bool encode(struct compare_work *work, const struct comparison *compariso
 		work->answer = (struct image_buffer){(unsigned char *)json, strlen(json)};
 		return true;
 	}
-	ok = ok &&
-	     (work->form == FORM_PNG ? comparison_to_png : comparison_to_exr)(comparison, json, images, &work->answer, error, sizeof error);
-	if (!ok)
+	ok = ok && (work->form == FORM_PNG ? comparison_to_png : comparison_to_exr)(comparison, json, images, &watch, &work->answer, error,
+										    sizeof error);
+	if (!ok && !job_is_over(work->ended))
 		log_error("request %s: encoding a comparison failed: %s", work->request->id, error);
 	free(json);
 	return ok;
@@ -233,11 +234,14 @@ static void compare(struct work *base)
 	const double compared = clock_now_ms();
 	timings_set(&work->spent, TIMING_COMPARE, compared - start);
 	if (ok && !job_is_over(work->ended)) {
-		work->ended->outcome = encode(work, &comparison) ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
+		work->ended->outcome = RENDER_OUTCOME_FAILED;
+		if (encode(work, &comparison))
+			work->ended->outcome = RENDER_OUTCOME_OK;
 		timings_set(&work->spent, TIMING_ENCODE, clock_now_ms() - compared);
 	}
 	if (work->ended->outcome == RENDER_OUTCOME_OK)
 		job_is_over(work->ended);
+	work->ended->encoded_ms = clock_now_ms() - start;
 	comparison_finish(&comparison);
 	for (int i = 0; i < RUNS_MAX; i++)
 		frame_drop_pixels(&work->run[i].job.frame);
@@ -293,9 +297,19 @@ static bool push(struct compare_work *work, struct compare_run *run)
 	return true;
 }
 
+static struct compare_run *run_to_decode(struct work *base)
+{
+	return (struct compare_run *)((char *)base - offsetof(struct compare_run, decode));
+}
+
+static bool waits_in_vain(struct work *base)
+{
+	return render_job_is_over(&run_to_decode(base)->job);
+}
+
 static void decode(struct work *base)
 {
-	struct compare_run *run = (struct compare_run *)((char *)base - offsetof(struct compare_run, decode));
+	struct compare_run *run = run_to_decode(base);
 	struct compare_work *work = run->work;
 	struct service *service = work->request->service;
 	run->job.waited_ms += clock_now_ms() - run->decoding_since_ms;
@@ -331,6 +345,7 @@ static bool start_run(struct compare_work *work)
 	run->job.abandoned = job_is_abandoned;
 	run->job.finished = on_rendered;
 	run->decode.run = decode;
+	run->decode.is_over = waits_in_vain;
 	admission_price(work->request, &run->job);
 	run->decoding_since_ms = clock_now_ms();
 	return scene_assets_take(service->maps, run->scene, &run->assets) ? push(work, run)

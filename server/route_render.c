@@ -52,7 +52,6 @@ struct render_work {
 	char key[DIGEST_SIZE], tag[ENTITY_TAG_SIZE];
 	bool may_be_found, may_be_kept; /* among the finished images */
 	bool is_kept;
-	double encode_ms;
 };
 
 static void work_release(void *context)
@@ -237,7 +236,7 @@ static enum MHD_Result finish(struct request *request)
 	timings_add_optics(&request->timings, work->job.prepared_ms, work->job.prepared);
 	timings_add(&request->timings, TIMING_FIELD, work->decode_ms[0]);
 	timings_add(&request->timings, TIMING_SKY, work->decode_ms[1]); /* the ground is part of it */
-	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
+	timings_set(&request->timings, TIMING_ENCODE, work->job.encoded_ms);
 	admission_keep(request, seat->image->size);
 	struct MHD_Response *response = create_response(request);
 	set_samples(response, work->job.frame.samples, work->job.frame.partial);
@@ -303,15 +302,23 @@ static void arrive(struct render_work *work, enum render_outcome outcome, struct
 	end_work(work);
 }
 
+static bool is_unwanted(void *context)
+{
+	struct render_work *work = context;
+	return !flight_is_wanted(&work->flight);
+}
+
 static struct finished_image *encode_frame(struct render_work *work)
 {
 	const struct frame *frame = &work->job.frame;
 	const struct image_metadata metadata = {
 		.scene_json = work->canonical, .request_id = work->id, .software = "stratus " RENDERER_VERSION};
+	const struct image_watch watch = {is_unwanted, work};
 	struct image_buffer file = {0};
 	char error[256] = "";
-	if (!work->service->images->encode(frame, &work->input.scene, &metadata, &file, error, sizeof error)) {
-		log_error("request %s: encoding failed: %s", work->id, error);
+	if (!work->service->images->encode(frame, &work->input.scene, &metadata, &watch, &file, error, sizeof error)) {
+		if (!is_unwanted(work))
+			log_error("request %s: encoding failed: %s", work->id, error);
 		return NULL;
 	}
 	return finished_image_create(work->tag, file.data, file.size, (double)frame->width * frame->height * frame->layer_count,
@@ -326,19 +333,21 @@ static void encode(struct work *base)
 	work->job.phase = RENDER_PHASE_ENCODING;
 	if (work->job.frame.partial)
 		flight_waive_deadlines(&work->flight); /* what was cut short for the deadline goes out, even if that passes now */
-	const bool wanted = flight_is_wanted(&work->flight), taken = wanted && frame_take_pixels(&work->job.frame);
+	bool wanted = !is_unwanted(work);
+	const bool taken = wanted && frame_take_pixels(&work->job.frame);
 	if (taken)
 		image = encode_frame(work);
+	wanted = image || !is_unwanted(work);
 	work->is_kept = image && work->may_be_kept && image_cache_keep(work->service->finished, image);
-	work->encode_ms = clock_now_ms() - start;
+	work->job.encoded_ms = clock_now_ms() - start;
 	if (image)
-		cost_model_learn_encoding(work->service->costs, &work->input.scene, work->encode_ms);
+		cost_model_learn_encoding(work->service->costs, &work->input.scene, work->job.encoded_ms);
 	frame_drop_pixels(&work->job.frame);
 	arrive(work,
-	       image    ? RENDER_OUTCOME_OK
-	       : taken  ? RENDER_OUTCOME_FAILED
-	       : wanted ? RENDER_OUTCOME_NO_MEMORY
-			: RENDER_OUTCOME_ABANDONED,
+	       image     ? RENDER_OUTCOME_OK
+	       : !wanted ? RENDER_OUTCOME_ABANDONED
+	       : taken   ? RENDER_OUTCOME_FAILED
+			 : RENDER_OUTCOME_NO_MEMORY,
 	       image);
 }
 
@@ -370,9 +379,19 @@ static bool is_over(void *context)
 	return render_job_is_over(context);
 }
 
+static struct render_work *work_to_decode(struct work *base)
+{
+	return (struct render_work *)((char *)base - offsetof(struct render_work, decode));
+}
+
+static bool waits_in_vain(struct work *base)
+{
+	return render_job_is_over(&work_to_decode(base)->job);
+}
+
 static void decode(struct work *base)
 {
-	struct render_work *work = (struct render_work *)((char *)base - offsetof(struct render_work, decode));
+	struct render_work *work = work_to_decode(base);
 	struct service *service = work->service;
 	work->job.waited_ms += clock_now_ms() - work->decoding_since_ms;
 	work->job.outcome = RENDER_OUTCOME_FAILED;
@@ -426,6 +445,7 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	work->job.finished = on_rendered;
 	work->encode.run = encode;
 	work->decode.run = decode;
+	work->decode.is_over = waits_in_vain;
 	/* Suspended first: whoever works for it may be done before flight_board or start returns. */
 	request_suspend(request, finish);
 	switch (flight_board(service->flights, may_be_found ? work->tag : NULL, &work->flight, &work->job.deadline_ms, &work->seat)) {

@@ -29,7 +29,6 @@ struct sky_work {
 	char tag[ENTITY_TAG_SIZE];
 	bool refused; /* the queue was full */
 	char *answer;
-	double write_ms;
 };
 
 static struct sky_work *work_of(struct render_job *job)
@@ -106,7 +105,7 @@ static enum MHD_Result finish(struct request *request)
 		return call_send_render_failure(request, work->job.outcome, "The sky", "so many directions");
 	timings_set(&request->timings, TIMING_SKY, work->job.light.timing.milliseconds);
 	request->timings.entry[TIMING_SKY].reused = work->job.light.timing.reused;
-	timings_set(&request->timings, TIMING_ENCODE, work->write_ms);
+	timings_set(&request->timings, TIMING_ENCODE, work->job.encoded_ms);
 	struct MHD_Response *response = response_create(request, work->answer, strlen(work->answer));
 	work->answer = NULL;
 	return send_light(request, MHD_HTTP_OK, response);
@@ -137,7 +136,7 @@ static void write_answer(struct work *base)
 			work->job.outcome = RENDER_OUTCOME_FAILED;
 		}
 	}
-	work->write_ms = clock_now_ms() - start;
+	work->job.encoded_ms = clock_now_ms() - start;
 	hand_back(work);
 }
 

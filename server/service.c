@@ -120,6 +120,7 @@ static void drop_over(void *context)
 	for (struct render_job *job; (job = render_queue_remove(service->queue, is_over, NULL));)
 		job->finished(job);
 	preparation_drop_over(service->preparation);
+	worker_pool_sweep(service->decoders);
 	drop_wrong(service);
 }
 

@@ -152,6 +152,16 @@ def test_failures_on_end(faulty):
     assert faulty.render(scene, Cache_Control="no-cache").status == 200
 
 
+def test_an_error_is_no_lack_of_memory(faulty):
+    """Not even where memory is asked for, by a new sky and a picture of a new size."""
+    scene = {"sun": {"elevation_deg": 17.75}, "output": {"width": 77, "height": 55}}
+    faulty.fail("gl-error")
+    answer = faulty.render(scene)
+    assert faulty.has_failed("gl-error")
+    assert (answer.status, answer.json["type"]) == (500, "urn:stratus:problem:render-failed")
+    assert faulty.render(scene).status == 200
+
+
 def test_many_requests_over_a_reset(faulty):
     """Whoever waits notices only that it takes longer."""
     with concurrent.futures.ThreadPoolExecutor(6) as pool:

@@ -208,6 +208,34 @@ def test_renders_go_on_beside_it(faulty):
         assert hanging.result().status == 504
 
 
+def copies_of(process):
+    return [int(pid) for pid in pathlib.Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+
+
+def test_who_leaves_the_line_before_the_decoder_is_dropped_at_once(faulty):
+    """While a picture is being looked through, and whatever that takes; who stays is served when it is over."""
+    queued = 'stratus_cancelled_total{at="queued"}'
+    assert faulty.request("PUT", "/v1/assets/good", strip(4)).status in (201, 204)
+    before = faulty.metric(queued)
+    render = b"GET /v1/render?clouds.map=good&clouds.resolution=%d&output.width=32&output.height=24 HTTP/1.1\r\nHost: x\r\nX-Timeout-Ms: 3600000\r\n\r\n"
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        hanging = pool.submit(faulty.request, "PUT", "/v1/assets/bad", strip(17), {"X-Timeout-Ms": "3600000"})
+        assert wait_for(lambda: copies_of(decoder_of(faulty)))
+        leaving, staying = (socket.create_connection(("127.0.0.1", faulty.port), timeout=300) for _ in range(2))
+        leaving.sendall(render % 128)
+        staying.sendall(render % 256)
+        assert wait_for(lambda: faulty.metric("stratus_queue_taken") == 2)
+        leaving.close()
+        assert wait_for(lambda: faulty.metric("stratus_queue_taken") == 1)
+        assert faulty.metric(queued) == before + 1
+        assert not hanging.done()
+        (copy,) = copies_of(decoder_of(faulty))
+        os.kill(copy, signal.SIGKILL)
+        assert hanging.result().status == 422
+    assert staying.recv(12) == b"HTTP/1.1 200"
+    staying.close()
+
+
 def test_stored_picture_that_cannot_be_read_any_more(faulty):
     answer = faulty.render({"clouds": {"map": "earlier"}, "output": SMALL})
     assert answer.status == 500 and "decoder" not in answer.body.decode()

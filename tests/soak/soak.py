@@ -1,6 +1,6 @@
 """Twenty minutes of everything at once, with faults: soak.py BUILD_DIR. SOAK_MINUTES=N for another time.
 
-A mixed open load (mix.jsonl), clients that leave while they are worked for, uploads and deletions, comparisons; every ten seconds a fault of the
+A mixed open load (mix.jsonl), less of it where the machine is slow, clients that leave while they are worked for, uploads and deletions, comparisons; every ten seconds a fault of the
 GPU or the memory. Afterwards the daemon's log must hold no answer of status 500 and above that no fault explains, memory must be flat (the last third
 within 5 % of the middle third) and file descriptors too, and the daemon must end with status 0. Fails otherwise.
 
@@ -26,7 +26,8 @@ import time
 
 BUILD = pathlib.Path(sys.argv[1])
 SECONDS = 60 * float(os.environ.get("SOAK_MINUTES", "20"))
-RATE = os.environ.get("SOAK_RATE", "4")
+# Requests a second, and the share of what the machine can do that this is at most: it has renderers to make anew, too.
+RATE, SHARE = float(os.environ.get("SOAK_RATE", "4")), 0.3
 FAULT_EVERY_S = 10
 # A renderer that is made anew takes seconds on processors, and works off meanwhile what has come.
 EXPLAINED_S = 30
@@ -86,6 +87,18 @@ class Daemon:
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
         kilobytes = int(status.split("VmRSS:")[1].split()[0])
         return kilobytes * 1024, len(os.listdir(f"/proc/{self.process.pid}/fd"))
+
+
+def bench(daemon, kept, seconds, *options):
+    server = f"http://127.0.0.1:{daemon.port}"
+    return [BUILD / "stratus", "bench", "--server", server, "--mix", HERE / "mix.jsonl", "--duration", str(seconds), "--json", kept, "-q", *options]
+
+
+def capacity(daemon):
+    """Requests a second that the machine can do."""
+    kept = KEPT / "capacity.json"
+    subprocess.run(bench(daemon, kept, 10, "--connections", "4", "--seed", "2"), check=True)
+    return json.loads(kept.read_text())["good_per_s"]
 
 
 def until(end, *actions):
@@ -188,9 +201,9 @@ def unexplained(lines, faults):
     return found, failures
 
 
-def thirds(values):
+def thirds(values, figure=statistics.median):
     third = len(values) // 3
-    return statistics.median(values[third : 2 * third]), statistics.median(values[2 * third :])
+    return figure(values[third : 2 * third]), figure(values[2 * third :])
 
 
 def check(broken, holds, text):
@@ -204,9 +217,9 @@ def main():
     broken, faults = [], []
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(2) as pool:
         daemon = Daemon(pathlib.Path(folder))
+        rate = min(RATE, SHARE * capacity(daemon))
         end = time.monotonic() + SECONDS
-        load = subprocess.Popen([BUILD / "stratus", "bench", "--server", f"http://127.0.0.1:{daemon.port}", "--rate", RATE, "--random", "--mix", HERE / "mix.jsonl",
-                                 "--duration", str(SECONDS), "--warm-up", "0", "--json", KEPT / "load.json", "-q"])
+        load = subprocess.Popen(bench(daemon, KEPT / "load.json", SECONDS, "--warm-up", "0", "--rate", f"{max(rate, 0.1):.3f}", "--random"))
         others = [pool.submit(visitors, daemon, end), pool.submit(inject, daemon, end, faults)]
         samples = watch(daemon, end)
         for other in others:
@@ -221,7 +234,7 @@ def main():
     memory, descriptors = zip(*samples)
     before, after = thirds(memory)
     happened = collections.Counter(fault.name for fault in faults if fault.happened)
-    print(f"{report['asked']} requests of the load: {report['status']}, errors {report['error']}")
+    print(f"{report['asked']} requests of the load, {rate:.1f}/s: {report['status']}, errors {report['error']}")
     print(f"faults that struck: {dict(happened)}; answers of 500 and above: {dict(failures)}")
     check(broken, status == 0, f"the daemon ended with status {status}")
     check(broken, len(samples) > 0.9 * SECONDS, "it lived to the end")
@@ -230,8 +243,8 @@ def main():
     check(broken, not found, f"{len(found)} failures that no fault explains" + "".join("\n            " + line for line in found[:5]))
     check(broken, report["errors"] == 0, f"{report['errors']} requests without any answer")
     check(broken, abs(after / before - 1) <= 0.05, f"resident memory {before / 2**20:.0f} MiB in the middle third, {after / 2**20:.0f} MiB in the last")
-    before, after = thirds(descriptors)
-    check(broken, abs(after - before) <= 3, f"{before:g} descriptors in the middle third, {after:g} in the last")
+    before, after = thirds(descriptors, min)  # connections come and go, and what leaks stays
+    check(broken, abs(after - before) <= 3, f"{before} descriptors and more in the middle third, {after} in the last")
     check(broken, report["kind"]["hot"]["count"] > 0 and report["good"]["count"] > 0.8 * report["asked"] * 24 / 26, f"{report['good']['count']} good answers")
     return 1 if broken else 0
 

@@ -216,7 +216,8 @@ void admission_refuse(struct request *request, const struct render_job *job)
 			    service_queue_pixels(service) * 1e-6, config->queue_mpixels);
 	else
 		problem_set(&request->problem, PROBLEM_QUEUE_FULL,
-			    "Half of %d pictures wait for droplets or maps, and no more may (--queue-length).", config->queue_length);
+			    "No place is left: %d pictures may be in work, and half of them wait for droplets or maps (--queue-length).",
+			    config->queue_length);
 	metrics_count_rejection(service->metrics, pixels ? REJECTED_PIXELS : REJECTED_FULL);
 }
 

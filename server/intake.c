@@ -14,6 +14,9 @@
 #define FREE_SHARE 0.25
 /* Before anything is measured, in places. */
 #define MARGIN_START 0.25
+#define MARGIN_MOST  0.5
+/* Service times: a few pictures between renderer and answer, and one that takes thrice as long as others. */
+#define MARGIN_USUAL 8.0
 /* Weight of each measurement in the service time, for all but the first. */
 #define SERVICE_GAIN (1.0 / 32)
 /* From so many measurements on the service time is good for refusing anybody. */
@@ -89,12 +92,14 @@ static void measure_service(struct intake *intake, double now_ms)
 	intake->answered_ms = now_ms;
 }
 
-/* Steps of one service time, up as rarely as is wanted: the margin comes to rest where they cancel out. */
+/* Up by a service time as rarely as is wanted, else a little down: the margin comes to rest where these cancel out. A large one falls
+ * faster and is bounded, so that a time in which nothing was answered, when a renderer is made anew, is forgotten after a few thousand
+ * answers. */
 static void learn_margin(struct intake *intake, const struct intake_place *place, double now_ms)
 {
 	const bool late = now_ms - place->since_ms > place->ahead_ms + intake->margin * intake->service_ms;
-	intake->margin += late ? 1 - LATE_SHARE : -LATE_SHARE;
-	intake->margin = fmin(fmax(intake->margin, 0), (double)intake->places);
+	intake->margin += late ? 1 : -LATE_SHARE * fmax(1, intake->margin / MARGIN_USUAL);
+	intake->margin = fmin(fmax(intake->margin, 0), MARGIN_MOST * (double)intake->places);
 }
 
 void intake_leave(struct intake *intake, struct intake_place *place, bool answered, double now_ms)

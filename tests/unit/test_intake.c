@@ -101,6 +101,29 @@ static void places_are_given_by_time(void **state)
 	intake_destroy(intake);
 }
 
+/* As when a renderer is made anew: all who wait are late. That neither closes the line nor lasts. */
+static void a_pause_is_forgotten(void **state)
+{
+	(void)state;
+	enum { PLACES = 40, TAKEN = 20 };
+	struct intake *intake = intake_create(PLACES);
+	struct intake_place places[TAKEN] = {0};
+	double late_ms, now_ms = answer_steadily(intake, 12, 60, 25, 1000);
+	for (int pause = 0; pause < 4; pause++) {
+		for (int i = 0; i < TAKEN; i++)
+			assert_int_equal(intake_enter(intake, &places[i], 10, now_ms, &late_ms), INTAKE_TAKEN);
+		now_ms += 10000;
+		for (int i = 0; i < TAKEN; i++)
+			intake_leave(intake, &places[i], true, now_ms += 25);
+	}
+	assert_true(intake_look(intake).margin > 15);
+	/* The line is shorter than half of the places, and longer than a quarter. */
+	now_ms = answer_steadily(intake, 14, 8000, 25, now_ms);
+	assert_true(intake_look(intake).margin < 5);
+	assert_float_equal(intake_look(intake).service_ms, 25, 0.1);
+	intake_destroy(intake);
+}
+
 /* --- an overload ------------------------------------------------------------------------------------------------------------------- */
 
 /* Requests of one client at random times, for pictures of three kinds, one of which takes three times as long as the others; predicted
@@ -255,7 +278,7 @@ static void an_overload_keeps_to_the_bound(void **state)
 			for (uint64_t seed = 1; seed <= 3; seed++) {
 				const struct figures figures = simulate(places[i], rate, seed);
 				assert_true(figures.p99 <= 1);
-				assert_true(figures.goodput >= (rate > 1 ? 0.97 : 0.83)); /* at 1 there are gaps */
+				assert_true(figures.goodput >= (rate > 1 ? 0.95 : 0.83)); /* at 1 there are gaps */
 				/* As many dear ones as are asked for: 1 of 9. */
 				assert_true(figures.dear > 0.08 && figures.dear < 0.14);
 			}
@@ -291,11 +314,9 @@ static void many_threads(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(as_many_as_there_are),
-		cmocka_unit_test(the_service_time_is_that_between_answers),
-		cmocka_unit_test(places_are_given_by_time),
-		cmocka_unit_test(an_overload_keeps_to_the_bound),
-		cmocka_unit_test(many_threads),
+		cmocka_unit_test(as_many_as_there_are),           cmocka_unit_test(the_service_time_is_that_between_answers),
+		cmocka_unit_test(places_are_given_by_time),       cmocka_unit_test(a_pause_is_forgotten),
+		cmocka_unit_test(an_overload_keeps_to_the_bound), cmocka_unit_test(many_threads),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -159,23 +159,6 @@ def test_who_leaves_the_line_is_dropped_at_once(served):
     assert wait_for(lambda: served.metric('stratus_cancelled_total{at="queued"}') == before + 10)
 
 
-def test_who_leaves_while_a_file_is_written(served):
-    """It is stopped between two rows. When it is being written depends on the machine: sooner or later it is hit."""
-    scene = {"clouds": {"type": "none"}, "output": {"width": 2560, "height": 1920, "png_compression": "small"}}
-    before = served.metric('stratus_cancelled_total{at="encoding"}')
-    wasted = served.metric('stratus_wasted_render_seconds_total{reason="abandoned"}')
-    seconds, azimuth = 0.2, 0
-    while served.metric('stratus_cancelled_total{at="encoding"}') == before and seconds < 60:
-        client = send(served, {**scene, "camera": {"azimuth_deg": azimuth}})
-        time.sleep(seconds)
-        client.close()
-        assert wait_for(lambda: served.metric("stratus_requests_in_flight") == 1)
-        seconds, azimuth = 1.3 * seconds, azimuth + 1
-    assert served.metric('stratus_cancelled_total{at="encoding"}') == before + 1
-    assert served.metric('stratus_wasted_render_seconds_total{reason="abandoned"}') > wasted
-    assert served.metric("stratus_picture_memory_bytes") == served.metric("stratus_queue_taken") == 0
-
-
 def test_places_are_for_all_that_is_accepted(start_daemon):
     """What is rendered has one too, until it is answered; who leaves gives it back."""
     daemon = start_daemon("--queue-length", "2")

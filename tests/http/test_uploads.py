@@ -115,7 +115,9 @@ def test_bad_pictures_are_known_early(daemon):
 FAULTY_MODULE = """
 #include "renderer/image/image.h"
 #include <dlfcn.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 static const struct image_api *real;
 
@@ -127,6 +129,20 @@ static bool decode(int fd, const struct picture_file *file, image_rows_taker *ta
 	while (file->width == 17)
 		__asm__ volatile("");
 	return real->decode(fd, file, take, context, error, size);
+}
+
+/* Pictures 19 wide are never written to their end. */
+static bool encode(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata, const struct image_watch *watch,
+		   struct image_buffer *buffer, char *error, size_t size)
+{
+	if (frame->width != 19)
+		return real->encode(frame, scene, metadata, watch, buffer, error, size);
+	fputs("a picture 19 wide is being written\\n", stderr);
+	while (!watch->is_over(watch->context))
+		usleep(1000);
+	snprintf(error, size, "stopped");
+	*buffer = (struct image_buffer){0};
+	return false;
 }
 
 const struct image_api *stratus_image_api(void);
@@ -141,6 +157,7 @@ const struct image_api *stratus_image_api(void)
 	real = entry();
 	faulty = *real;
 	faulty.decode = decode;
+	faulty.encode = encode;
 	return &faulty;
 }
 """
@@ -148,7 +165,7 @@ const struct image_api *stratus_image_api(void)
 
 @pytest.fixture(scope="module")
 def faulty(tmp_path_factory):
-    """A daemon whose library fails on pictures 13 and 17 wide; one 13 wide was stored before it began to fail."""
+    """A daemon whose library fails on pictures 13, 17 and 19 wide; one 13 wide was stored before it began to fail."""
     folder = tmp_path_factory.mktemp("faulty")
     source, module = folder / "faulty.c", folder / "faulty.so"
     source.write_text(FAULTY_MODULE.replace("REAL", f'"{BUILD / "stratus-image.so"}"'))
@@ -234,6 +251,27 @@ def test_who_leaves_the_line_before_the_decoder_is_dropped_at_once(faulty):
         assert hanging.result().status == 422
     assert staying.recv(12) == b"HTTP/1.1 200"
     staying.close()
+
+
+def test_writing_a_picture_stops_when_nobody_waits(faulty):
+    """Asked between rows: when the deadline passes, and when the client leaves. Neither is a failure of the encoder."""
+    ended = {reason: f'stratus_renders_ended_total{{reason="{reason}"}}' for reason in ("expired", "abandoned", "failed")}
+    before = {reason: faulty.metric(name) for reason, name in ended.items()}
+    begun = lambda: faulty.log.read_text().count("a picture 19 wide is being written")
+    encoding, wasted = 'stratus_cancelled_total{at="encoding"}', 'stratus_wasted_render_seconds_total{reason="abandoned"}'
+    late = faulty.render({"output": {"width": 19, "height": 16}}, X_Timeout_Ms="2000")
+    assert_problem(late, 504, "deadline-passed")
+    assert wait_for(lambda: faulty.metric("stratus_queue_taken") == 0)
+    cancelled, seconds, earlier = faulty.metric(encoding), faulty.metric(wasted), begun()
+    with socket.create_connection(("127.0.0.1", faulty.port), timeout=60) as client:
+        client.sendall(b"GET /v1/render?output.width=19&output.height=17 HTTP/1.1\r\nHost: x\r\nX-Timeout-Ms: 3600000\r\n\r\n")
+        assert wait_for(lambda: begun() == earlier + 1)
+        time.sleep(0.2)
+    assert wait_for(lambda: faulty.metric("stratus_queue_taken") == 0)
+    assert {reason: faulty.metric(name) - before[reason] for reason, name in ended.items()} == {"expired": 1, "abandoned": 1, "failed": 0}
+    assert faulty.metric(encoding) == cancelled + 1
+    assert faulty.metric(wasted) >= seconds + 0.2
+    assert "encoding failed" not in faulty.log.read_text()
 
 
 def test_stored_picture_that_cannot_be_read_any_more(faulty):

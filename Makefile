@@ -6,7 +6,7 @@
 # make judge   measures the slab against its reference over 24 scenes and writes docs/judge, some 20 minutes; goes on where it was stopped
 # make gallery   draws the pictures of docs/gallery
 # make fuzz     throws bytes at every reader of what strangers send, FUZZ_SECONDS (600) each; FUZZ="name name" takes these alone
-# make load     offers a daemon half of what it can do up to four times as much; three minutes
+# make load     offers a daemon half of what it can do up to four times as much; two and a half minutes
 # make golden    writes what the golden render is now into renderer/golden_values.inc: after a change of what pictures look like
 # make scene-classes   writes the Python package's classes of a scene anew, after openapi.yaml changed
 # make soak     twenty minutes of mixed load with faults injected

@@ -1,8 +1,8 @@
 #include "renderer/renderer.h"
 
+#include "renderer/frame_transfer.h"
 #include "renderer/gl/context.h"
 #include "renderer/gl/memory.h"
-#include "renderer/gl/readback.h"
 #include "renderer/gl/timer.h"
 #include "renderer/log.h"
 #include "renderer/scene_map.h"
@@ -20,14 +20,6 @@
 
 const char *const stage_names[STAGE_COUNT] = {"optics", "sky", "field", "radiosity", "view", "readback"};
 
-_Static_assert((int)RENDERER_TRANSFERS_MAX == (int)READBACK_SLOTS, "each has a place");
-
-/* A picture on its way, and the timers of its stages, to be read when it is there. */
-struct transfer {
-	struct readback_slot *slot;
-	struct gl_timer timers[STAGE_COUNT];
-};
-
 struct renderer {
 	struct gl_context *gl;
 	struct renderer_info info;
@@ -42,8 +34,7 @@ struct renderer {
 	struct sun_cover_stage sun_cover;
 	struct sea_stage sea;
 	struct gl_timer timers[STAGE_COUNT];
-	struct readback readback;
-	struct transfer transfers[READBACK_SLOTS]; /* of its slots */
+	struct frame_transfers transfers;
 };
 
 enum { DEFAULT_CACHE_BYTES = 256 << 20 };
@@ -165,12 +156,9 @@ void renderer_destroy(struct renderer *renderer)
 	if (!renderer)
 		return;
 	if (renderer->gl) {
-		for (int i = 0; i < STAGE_COUNT; i++) {
+		for (int i = 0; i < STAGE_COUNT; i++)
 			gl_timer_finish(&renderer->timers[i]);
-			for (int j = 0; j < READBACK_SLOTS; j++)
-				gl_timer_finish(&renderer->transfers[j].timers[i]);
-		}
-		readback_finish(&renderer->readback);
+		transfers_finish(&renderer->transfers);
 		cache_destroy(renderer->context.cache); /* first: what it drops may go back to a stage */
 		finish_stages(renderer);
 		if (renderer->context.block_buffer)
@@ -459,103 +447,22 @@ static bool run_view(struct job *job)
 	return true;
 }
 
-/* Inlined, so that the compiler knows the size. */
-static inline void pack(unsigned char *to, const unsigned char *from, size_t count, size_t component)
-{
-	for (size_t i = 0; i < count; i++, to += 3 * component, from += 4 * component)
-		memmove(to, from, 3 * component);
-}
-
-/* Drops every fourth component; `to` may be `from`. */
-static void pack_rgb(unsigned char *to, const unsigned char *from, size_t count, size_t component)
-{
-	if (component == 1)
-		pack(to, from, count, 1);
-	else if (component == 2)
-		pack(to, from, count, 2);
-	else
-		pack(to, from, count, 4);
-}
-
-/* The pictures of a job, one for each layer. */
-static const struct texture *picture_of(const struct job *job, int layer)
-{
-	return job->scene->output.format == IMAGE_PNG ? &job->developed : job->pictures[layer];
-}
-
-static size_t component_bytes(const struct frame *frame)
-{
-	return frame->type == PIXEL_F32 ? 4 : frame->type == PIXEL_U16 ? 2 : 1;
-}
-
-static GLenum component_type(const struct frame *frame)
-{
-	return frame->type == PIXEL_F32 ? GL_FLOAT : frame->type == PIXEL_U16 ? GL_UNSIGNED_SHORT : GL_UNSIGNED_BYTE;
-}
-
-static size_t texel_count(const struct frame *frame)
-{
-	return (size_t)frame->width * (size_t)frame->height;
-}
-
-/* Has the pixels sent to a buffer, where there is one for them. */
-static bool send_pixels(struct job *job)
-{
-	struct renderer *renderer = job->renderer;
-	struct frame *frame = job->frame;
-	const size_t plane = texel_count(frame) * 4 * component_bytes(frame);
-	struct readback_slot *slot = readback_lend(&renderer->readback, plane * (size_t)frame->layer_count);
-	if (!slot)
-		return false;
-	for (int i = 0; i < frame->layer_count; i++)
-		readback_copy(slot, picture_of(job, i)->id, component_type(frame), (size_t)i * plane, plane);
-	frame->transfer = &renderer->transfers[slot - renderer->readback.slots];
-	frame->transfer->slot = slot;
-	return true;
-}
-
-/* Waits for the GPU and reads. */
-static bool read_pixels(struct job *job)
-{
-	struct frame *frame = job->frame;
-	const size_t component = component_bytes(frame), texels = texel_count(frame), plane = texels * 3 * component;
-	glFinish();
-	const double begin = clock_milliseconds();
-	/* Room for the fourth component of the last layer while it is packed. */
-	unsigned char *pixels = frame->pixels = malloc(frame->bytes + texels * component);
-	if (!pixels)
-		return false;
-	for (int i = 0; i < frame->layer_count; i++) {
-		glGetTextureImage(picture_of(job, i)->id, 0, GL_RGBA, component_type(frame), (GLsizei)(texels * 4 * component),
-				  pixels + (size_t)i * plane);
-		pack_rgb(pixels + (size_t)i * plane, pixels + (size_t)i * plane, texels, component);
-	}
-	frame->timing[STAGE_READBACK].milliseconds = clock_milliseconds() - begin;
-	return true;
-}
-
 static bool run_readback(struct job *job)
 {
 	struct frame *frame = job->frame;
 	const struct scene_output *output = &job->scene->output;
+	const struct texture *developed = &job->developed;
 	frame->width = output->width;
 	frame->height = output->height;
 	frame->channels = 3;
 	frame->type = output->format != IMAGE_PNG ? PIXEL_F32 : output->bits == 16 ? PIXEL_U16 : PIXEL_U8;
-	frame->bytes = texel_count(frame) * 3 * component_bytes(frame) * (size_t)frame->layer_count;
-	return send_pixels(job) || read_pixels(job);
+	return transfers_read(&job->renderer->transfers, frame, output->format == IMAGE_PNG ? &developed : job->pictures);
 }
 
 static bool (*const stage_functions[STAGE_COUNT])(struct job *job) = {
 	[STAGE_OPTICS] = run_optics,       [STAGE_SKY] = run_sky,   [STAGE_FIELD] = run_field,
 	[STAGE_RADIOSITY] = run_radiosity, [STAGE_VIEW] = run_view, [STAGE_READBACK] = run_readback,
 };
-
-/* Of a picture that travels the read-back is the GPU's copy and what follows in frame_take_pixels; else it is measured as it is done. */
-static bool on_processor(enum stage stage, const struct frame *frame)
-{
-	return stage == STAGE_OPTICS || (stage == STAGE_READBACK && !frame->transfer);
-}
 
 /* What went on before, in the same picture. */
 static void add_spent(struct job *job)
@@ -579,23 +486,40 @@ static bool is_cancelled(const struct job *job)
 	return job->cancelled && !has_samples(job) && job->cancelled(job->cancel_context);
 }
 
+/* Those of another picture do not count. */
+static void forget_faults(void)
+{
+	pass_was_refused();
+	gl_failed_otherwise();
+}
+
+/* Of a stage that could not do its work. */
+static enum render_result result_of_fault(void)
+{
+	const bool no_program = pass_was_refused(), failed = gl_failed_otherwise();
+	return gl_lost() ? RENDER_FAILED : no_program ? RENDER_NO_PROGRAM : failed ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+}
+
 static enum render_result result_of_failure(const struct job *job)
 {
 	if (job->unfinished)
 		return RENDER_UNFINISHED;
-	if (job->cancelled && job->cancelled(job->cancel_context))
+	if (job->renderer->context.stopped || (job->cancelled && job->cancelled(job->cancel_context)))
 		return RENDER_CANCELLED;
-	return gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+	return result_of_fault();
 }
 
-/* The timers that ran go with the picture; those of the last one that went this way are for the next. */
-static void depart(struct renderer *renderer, struct transfer *transfer)
+static bool job_is_cancelled(void *context)
 {
-	struct gl_timer kept[STAGE_COUNT];
-	memcpy(kept, transfer->timers, sizeof kept);
-	memcpy(transfer->timers, renderer->timers, sizeof kept);
-	memcpy(renderer->timers, kept, sizeof kept);
-	readback_send(transfer->slot);
+	return is_cancelled(context);
+}
+
+/* Whom the stages ask between their passes; NULL: nobody. */
+static void set_cancelled(struct renderer *renderer, renderer_cancelled *cancelled, void *context)
+{
+	renderer->context.cancelled = cancelled;
+	renderer->context.cancel_context = context;
+	renderer->context.stopped = false;
 }
 
 static enum render_result run_stages(struct job *job)
@@ -619,11 +543,7 @@ static enum render_result run_stages(struct job *job)
 		if (gl_failed(stage_names[i]))
 			return gl_failed_for_memory() ? RENDER_OUT_OF_MEMORY : RENDER_FAILED;
 	}
-	for (int i = 0; i < STAGE_COUNT; i++)
-		if (!on_processor((enum stage)i, job->frame))
-			job->frame->timing[i].milliseconds = job->frame->transfer ? 0 : gl_timer_milliseconds(&renderer->timers[i]);
-	if (job->frame->transfer)
-		depart(renderer, job->frame->transfer);
+	transfers_depart(job->frame, renderer->timers);
 	return RENDER_OK;
 }
 
@@ -685,6 +605,7 @@ enum render_result renderer_start(struct renderer *renderer, const struct scene 
 		renderer_drop_pending(pending);
 		return RENDER_OUT_OF_MEMORY;
 	}
+	forget_faults();
 	cache_begin_frame(renderer->context.cache);
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
 	view_fill_block(&renderer->context.block, scene);
@@ -694,7 +615,9 @@ enum render_result renderer_start(struct renderer *renderer, const struct scene 
 	renderer->context.block.cloud_layer[1] = (float)scene->clouds.thickness_m;
 	renderer->context.block.cloud_layer[3] = scene->clouds.type != CLOUD_NONE && scene->clouds.thickness_m > 0;
 
+	set_cancelled(renderer, cancelled ? job_is_cancelled : NULL, &job);
 	const enum render_result result = run_stages(&job);
+	set_cancelled(renderer, NULL, NULL);
 	add_spent(&job);
 	settle_pending(&job, result);
 	frame->radiosity_passes = job.light.passes;
@@ -725,45 +648,6 @@ double renderer_free_memory(void)
 	return gl_free_memory();
 }
 
-/* --- a picture's arrival ------------------------------------------------------------------------------------------------------------ */
-
-enum render_result renderer_arrive(struct renderer *renderer, struct frame *frame, double milliseconds)
-{
-	struct transfer *transfer = frame->transfer;
-	(void)renderer; /* whose thread it is */
-	if (!transfer)
-		return RENDER_OK;
-	switch (readback_await(transfer->slot, milliseconds)) {
-	case READBACK_TRAVELS:
-		return RENDER_UNFINISHED;
-	case READBACK_LOST:
-		log_error("renderer: a picture did not arrive");
-		frame_finish(frame);
-		return RENDER_FAILED;
-	case READBACK_ARRIVED:
-		break;
-	}
-	for (int i = 0; i < STAGE_COUNT; i++)
-		if (!on_processor((enum stage)i, frame))
-			frame->timing[i].milliseconds += gl_timer_milliseconds(&transfer->timers[i]);
-	return RENDER_OK;
-}
-
-bool frame_take_pixels(struct frame *frame)
-{
-	if (!frame->transfer)
-		return true;
-	const double begin = clock_milliseconds();
-	struct readback_slot *slot = frame->transfer->slot;
-	frame->pixels = malloc(frame->bytes);
-	if (frame->pixels)
-		pack_rgb(frame->pixels, slot->mapped, texel_count(frame) * (size_t)frame->layer_count, component_bytes(frame));
-	frame->transfer = NULL;
-	readback_give_back(slot);
-	frame->timing[STAGE_READBACK].milliseconds += clock_milliseconds() - begin;
-	return frame->pixels;
-}
-
 /* --- the sky alone ----------------------------------------------------------------------------------------------------------------- */
 
 static enum render_result run_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
@@ -775,7 +659,7 @@ static enum render_result run_sky_light(struct renderer *renderer, const struct 
 			sky_stage_run_directions(&renderer->sky, context, scene, ground.mean, directions, light);
 	if (gl_failed("sky light") && !gl_failed_for_memory())
 		return RENDER_FAILED;
-	return ok ? RENDER_OK : gl_lost() ? RENDER_FAILED : RENDER_OUT_OF_MEMORY;
+	return ok ? RENDER_OK : context->stopped ? RENDER_CANCELLED : result_of_fault();
 }
 
 enum render_result renderer_sky_light(struct renderer *renderer, const struct scene *scene, const struct sky_directions *directions,
@@ -786,13 +670,16 @@ enum render_result renderer_sky_light(struct renderer *renderer, const struct sc
 	*light = (struct sky_light){0};
 	if (cancelled && cancelled(context))
 		return RENDER_CANCELLED;
+	forget_faults();
 	cache_begin_frame(renderer->context.cache);
 	memset(&renderer->context.block, 0, sizeof renderer->context.block);
 	view_fill_block(&renderer->context.block, &clear);
 	renderer->context.reused = true;
 	cache_set_owner(renderer->context.cache, STAGE_SKY);
 	gl_timer_begin(&renderer->timers[STAGE_SKY]);
+	set_cancelled(renderer, cancelled, context);
 	enum render_result result = run_sky_light(renderer, &clear, directions, light);
+	set_cancelled(renderer, NULL, NULL);
 	gl_timer_end(&renderer->timers[STAGE_SKY]);
 	light->timing = (struct stage_timing){gl_timer_milliseconds(&renderer->timers[STAGE_SKY]), false};
 	if (result == RENDER_OK && cancelled && cancelled(context))
@@ -804,19 +691,4 @@ enum render_result renderer_sky_light(struct renderer *renderer, const struct sc
 		*light = (struct sky_light){0};
 	}
 	return result;
-}
-
-void frame_drop_pixels(struct frame *frame)
-{
-	if (frame->transfer)
-		readback_give_back(frame->transfer->slot);
-	frame->transfer = NULL;
-	free(frame->pixels);
-	frame->pixels = NULL;
-}
-
-void frame_finish(struct frame *frame)
-{
-	frame_drop_pixels(frame);
-	*frame = (struct frame){0};
 }

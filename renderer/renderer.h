@@ -92,7 +92,14 @@ size_t renderer_cache_bytes(const struct renderer *renderer, enum stage stage);
 /* Asked between passes by renderer_render: true stops the work. */
 typedef bool renderer_cancelled(void *context);
 
-enum render_result { RENDER_OK, RENDER_UNFINISHED, RENDER_CANCELLED, RENDER_OUT_OF_MEMORY, RENDER_FAILED };
+enum render_result {
+	RENDER_OK,
+	RENDER_UNFINISHED,
+	RENDER_CANCELLED,
+	RENDER_OUT_OF_MEMORY,
+	RENDER_NO_PROGRAM, /* a shader that this scene takes does not compile, which the log names; others may do */
+	RENDER_FAILED
+};
 
 /* Renders a valid scene; a map that it names must be there. cancelled may be NULL. On RENDER_OK the caller owns frame->pixels
  * (frame_finish); else the frame is zeroed and one log line says why. A scene of MODEL_REFERENCE with model.partial that is cancelled after

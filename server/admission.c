@@ -51,27 +51,32 @@ static void note_queue(struct request *request)
 
 void admission_keep(struct request *request, size_t bytes)
 {
-	if (bytes < request->memory_bytes) {
-		request->service->memory_bytes -= request->memory_bytes - bytes;
-		request->memory_bytes = bytes;
-	}
+	request->service->memory_bytes += bytes - request->memory_bytes;
+	request->memory_bytes = bytes;
 }
 
-static bool take_memory(struct request *request, double bytes)
+static bool take_memory(struct request *request, struct promise *promise, double bytes)
 {
 	struct service *service = request->service;
 	const size_t size = (size_t)bytes, before = atomic_fetch_add(&service->memory_bytes, size);
-	request->memory_bytes = size;
+	promise->memory_bytes = size;
 	/* Variants of a comparison may be larger together than any picture: alone they go. */
 	if (before == 0 || (double)before + bytes <= memory_limit(service->config))
 		return true;
-	admission_keep(request, 0);
+	admission_leave(service, promise, false);
 	note_queue(request);
 	problem_set(&request->problem, PROBLEM_MEMORY_LIMIT,
 		    "Pictures in work take about %zu MiB, and this one takes %.0f: at most %d together (--memory-mb).", before >> 20,
 		    ceil(bytes / (1 << 20)), service->config->memory_mb);
 	metrics_count_rejection(service->metrics, REJECTED_MEMORY);
 	return false;
+}
+
+void admission_leave(struct service *service, struct promise *promise, bool answered)
+{
+	intake_leave(service->intake, &promise->place, answered, clock_now_ms());
+	service->memory_bytes -= promise->memory_bytes;
+	promise->memory_bytes = 0;
 }
 
 /* --- time ------------------------------------------------------------------------------------------------------------------------- */
@@ -93,13 +98,19 @@ static struct cost cost_of(struct service *service, const struct scene *const *s
 	return sum;
 }
 
+/* Of those who wait for droplets. */
+static double preparation_line_ms(const struct service *service)
+{
+	return (double)preparation_depth(service->preparation) * preparation_typical_ms(service->preparation);
+}
+
 /* When the answer would be there, counted from now. *alone_ms: if there were no others. */
 static double predict(const struct request *request, const struct cost *cost, double *alone_ms)
 {
 	struct service *service = request->service;
 	double prepared_ms = cost->prepare_ms;
 	if (cost->prepare_ms > 0)
-		prepared_ms += (double)preparation_depth(service->preparation) * preparation_typical_ms(service->preparation);
+		prepared_ms += preparation_line_ms(service);
 	const double pace = cost_model_pace(service->costs);
 	const double ahead_ms = pace * render_queue_ahead_ms(service->queue, request->client, cost->render_ms);
 	*alone_ms = cost->prepare_ms + pace * cost->render_ms + cost->encode_ms;
@@ -130,15 +141,50 @@ static bool is_in_time(struct request *request, const struct cost *cost, double 
 	return false;
 }
 
-bool admission_enter(struct request *request, const struct scene *const *scenes, int count, const struct sky_directions *directions,
-		     double deadline_ms)
+/* --- places ----------------------------------------------------------------------------------------------------------------------- */
+
+/* What is done before the last of the request's client, pictures apart that no queue has yet. */
+static double ahead_ms(const struct request *request, const struct cost *cost)
+{
+	struct service *service = request->service;
+	const double unprepared_ms = preparation_backlog_ms(service->preparation);
+	const double rendered_ms =
+		cost_model_pace(service->costs) * (render_queue_ahead_ms(service->queue, request->client, INFINITY) + unprepared_ms);
+	return cost->prepare_ms > 0 ? fmax(rendered_ms, preparation_line_ms(service)) : rendered_ms;
+}
+
+static bool take_place(struct request *request, struct promise *promise, const struct cost *cost)
+{
+	struct service *service = request->service;
+	const int places = service->config->queue_length;
+	double late_ms;
+	switch (intake_enter(service->intake, &promise->place, ahead_ms(request, cost), clock_now_ms(), &late_ms)) {
+	case INTAKE_TAKEN:
+		return true;
+	case INTAKE_FULL:
+		problem_set(&request->problem, PROBLEM_QUEUE_FULL, "%d pictures are in work, and no more may (--queue-length).", places);
+		break;
+	case INTAKE_LONG:
+		problem_set(&request->problem, PROBLEM_QUEUE_FULL,
+			    "The answer would take longer than %d pictures usually do, which is as long as any may wait (--queue-length).",
+			    places);
+		break;
+	}
+	request->late_ms = late_ms;
+	note_queue(request);
+	metrics_count_rejection(service->metrics, REJECTED_FULL);
+	return false;
+}
+
+bool admission_enter(struct request *request, struct promise *promise, const struct scene *const *scenes, int count,
+		     const struct sky_directions *directions, double deadline_ms)
 {
 	struct service *service = request->service;
 	double bytes = 0;
 	for (int i = 0; i < count && !directions; i++)
 		bytes += bytes_of(scenes[i]);
 	const struct cost cost = cost_of(service, scenes, count, directions);
-	return is_in_time(request, &cost, deadline_ms) && take_memory(request, bytes);
+	return is_in_time(request, &cost, deadline_ms) && take_place(request, promise, &cost) && take_memory(request, promise, bytes);
 }
 
 void admission_price(const struct request *request, struct render_job *job)
@@ -169,7 +215,8 @@ void admission_refuse(struct request *request, const struct render_job *job)
 			    "Renders of %.1f megapixels are waiting, and at most %d may (--queue-mpixels).",
 			    service_queue_pixels(service) * 1e-6, config->queue_mpixels);
 	else
-		problem_set(&request->problem, PROBLEM_QUEUE_FULL, "%d renders are waiting, and no more may (--queue-length).",
+		problem_set(&request->problem, PROBLEM_QUEUE_FULL,
+			    "No place is left: %d pictures may be in work, and half of them wait for droplets or maps (--queue-length).",
 			    config->queue_length);
 	metrics_count_rejection(service->metrics, pixels ? REJECTED_PIXELS : REJECTED_FULL);
 }
@@ -177,9 +224,8 @@ void admission_refuse(struct request *request, const struct render_job *job)
 unsigned admission_retry_seconds(const struct request *request)
 {
 	const struct service *service = request->service;
-	const double backlog_ms =
-		cost_model_pace(service->costs) * render_queue_backlog_ms(service->queue) +
-		(service->ready ? (double)preparation_depth(service->preparation) * preparation_typical_ms(service->preparation) : 0);
+	const double backlog_ms = cost_model_pace(service->costs) * render_queue_backlog_ms(service->queue) +
+				  (service->ready ? preparation_line_ms(service) : 0);
 	const double seconds = 1e-3 * (request->late_ms > 0 ? fmin(request->late_ms, backlog_ms) : backlog_ms);
 	return (unsigned)fmin(fmax(ceil(seconds), 1), RETRY_SECONDS_MAX);
 }

@@ -75,7 +75,7 @@ void call_count_render(struct service *service, const struct render_job *job)
 {
 	log_debug("%.1f ms of the renderer were predicted, it took %.1f", job->predicted_ms, job->spent_ms);
 	if (job->outcome != RENDER_OUTCOME_OK)
-		metrics_count_waste(service->metrics, ends[job->outcome], job->spent_ms);
+		metrics_count_waste(service->metrics, ends[job->outcome], job->spent_ms + job->encoded_ms);
 	else if (job->predicted_ms > 0)
 		metrics_count_prediction(service->metrics, job->spent_ms / job->predicted_ms);
 	if (job->outcome == RENDER_OUTCOME_ABANDONED)

@@ -33,13 +33,13 @@ void comparison_finish(struct comparison *comparison);
 /* The figures as JSON text; the caller frees, NULL when out of memory. */
 char *comparison_to_json(const struct comparison *comparison);
 
-/* An EXR: layers NAME, NAME.difference, NAME.flip, NAME.standard_error and masks. json: comparison_to_json's. false after a message in
- * `error`. */
-bool comparison_to_exr(const struct comparison *comparison, const char *json, const struct image_api *images, struct image_buffer *buffer,
-		       char *error, size_t error_size);
+/* watch: as in image.h. An EXR: layers NAME, NAME.difference, NAME.flip, NAME.standard_error and masks. json: comparison_to_json's. false
+ * after a message in `error`. */
+bool comparison_to_exr(const struct comparison *comparison, const char *json, const struct image_api *images,
+		       const struct image_watch *watch, struct image_buffer *buffer, char *error, size_t error_size);
 
 /* A PNG: the pictures side by side, below them their relative differences, below these FLIP. Likewise. */
-bool comparison_to_png(const struct comparison *comparison, const char *json, const struct image_api *images, struct image_buffer *buffer,
-		       char *error, size_t error_size);
+bool comparison_to_png(const struct comparison *comparison, const char *json, const struct image_api *images,
+		       const struct image_watch *watch, struct image_buffer *buffer, char *error, size_t error_size);
 
 #endif

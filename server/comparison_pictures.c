@@ -99,8 +99,8 @@ static struct image_metadata describe(const struct comparison *comparison, const
 		.scene_json = *canonical ? *canonical : "", .software = "stratus " RENDERER_VERSION, .comparison = json};
 }
 
-bool comparison_to_exr(const struct comparison *comparison, const char *json, const struct image_api *images, struct image_buffer *buffer,
-		       char *error, size_t error_size)
+bool comparison_to_exr(const struct comparison *comparison, const char *json, const struct image_api *images,
+		       const struct image_watch *watch, struct image_buffer *buffer, char *error, size_t error_size)
 {
 	char *canonical;
 	const struct image_metadata metadata = describe(comparison, json, &canonical);
@@ -111,7 +111,7 @@ bool comparison_to_exr(const struct comparison *comparison, const char *json, co
 	if (ok) {
 		list_planes(comparison, own, list);
 		const struct image_planes planes = {comparison->width, comparison->height, list->plane, list->count};
-		ok = images->encode_planes(&planes, truth_scene(comparison), &metadata, buffer, error, error_size);
+		ok = images->encode_planes(&planes, truth_scene(comparison), &metadata, watch, buffer, error, error_size);
 	}
 	free(canonical);
 	free(list);
@@ -197,8 +197,8 @@ static void draw_sheet(const struct comparison *comparison, const struct sheet *
 	}
 }
 
-bool comparison_to_png(const struct comparison *comparison, const char *json, const struct image_api *images, struct image_buffer *buffer,
-		       char *error, size_t error_size)
+bool comparison_to_png(const struct comparison *comparison, const char *json, const struct image_api *images,
+		       const struct image_watch *watch, struct image_buffer *buffer, char *error, size_t error_size)
 {
 	char *canonical;
 	const struct image_metadata metadata = describe(comparison, json, &canonical);
@@ -219,7 +219,7 @@ bool comparison_to_png(const struct comparison *comparison, const char *json, co
 	snprintf(error, error_size, "out of memory");
 	if (ok) {
 		draw_sheet(comparison, &sheet);
-		ok = images->encode(&frame, &scene, &metadata, buffer, error, error_size);
+		ok = images->encode(&frame, &scene, &metadata, watch, buffer, error, error_size);
 	}
 	free(canonical);
 	frame_finish(&frame);

@@ -48,7 +48,7 @@ struct cost_model {
 	double start_ms; /* for each megapixel */
 	double log_pace;
 	struct line_fit views[MODEL_COUNT][SIGHT_COUNT][FORM_COUNT], models[MODEL_COUNT];
-	struct line_fit light, prepare, parts[PART_COUNT][SIGHT_COUNT];
+	struct line_fit light, prepare, parts[PART_COUNT][SIGHT_COUNT], fields[CLOUD_TYPE_COUNT][SIGHT_COUNT];
 	struct line_fit png[PNG_COMPRESSION_COUNT], exr[EXR_COMPRESSION_COUNT];
 	struct memory known[PART_COUNT];
 };
@@ -185,6 +185,13 @@ static enum sight part_sight(const struct scene *scene, enum part part)
 	return part == PART_FIELD || (part == PART_SKY && sight == SIGHT_CLEAR) ? sight : SIGHT_BELOW;
 }
 
+/* That of the part alone; fields of some types have more layers of cells than others. */
+static struct line_fit *part_fit(struct cost_model *model, const struct scene *scene, enum part part)
+{
+	const enum sight sight = part_sight(scene, part);
+	return part == PART_FIELD ? &model->fields[scene->clouds.type][sight] : &model->parts[part][sight];
+}
+
 static uint64_t part_key(const struct scene *scene, enum part part)
 {
 	static uint64_t (*const keys[PART_COUNT])(const struct scene *) = {
@@ -258,12 +265,19 @@ static double predict_view(struct cost_model *model, const struct scene *scene, 
 /* Of what a megapixel takes, before anything is measured. */
 static const double start_shares[PART_COUNT] = {[PART_OPTICS] = 0.15, [PART_SKY] = 0.2, [PART_FIELD] = 2, [PART_RADIOSITY] = 0.1};
 
+/* Likewise: types that were never seen go by others. */
+static double predict_part(struct cost_model *model, const struct scene *scene, enum part part, bool *fresh)
+{
+	const struct line_fit *own = part_fit(model, scene, part), *others = &model->parts[part][part_sight(scene, part)];
+	*fresh &= own->count > 0;
+	return use(own->count ? own : others, part_size(scene, part), start_shares[part] * model->start_ms, fresh);
+}
+
 static void predict_picture(struct cost_model *model, const struct scene *scene, struct cost *cost)
 {
 	for (enum part part = 0; part < PART_COUNT; part++)
 		if (has_part(scene, part) && !is_known(&model->known[part], part_key(scene, part)))
-			cost->render_ms += use(&model->parts[part][part_sight(scene, part)], part_size(scene, part),
-					       start_shares[part] * model->start_ms, &cost->fresh);
+			cost->render_ms += predict_part(model, scene, part, &cost->fresh);
 	double view_ms = predict_view(model, scene, &cost->fresh);
 	if (scene->model.name == MODEL_REFERENCE && scene->model.time_budget_ms > 0)
 		view_ms = fmin(view_ms, scene->model.time_budget_ms);
@@ -305,7 +319,10 @@ static void learn_picture(struct cost_model *model, const struct render_job *job
 			learn_reach(&model->known[part], job->cost_ranks[part] - 1, timing->reused);
 		if (timing->reused || timing->milliseconds <= 0)
 			continue;
-		line_fit_add(&model->parts[part][part_sight(scene, part)], part_size(scene, part), timing->milliseconds, now_ms);
+		struct line_fit *own = part_fit(model, scene, part), *all = &model->parts[part][part_sight(scene, part)];
+		line_fit_add(own, part_size(scene, part), timing->milliseconds, now_ms);
+		if (all != own)
+			line_fit_add(all, part_size(scene, part), timing->milliseconds, now_ms);
 		view_ms -= timing->milliseconds;
 	}
 	/* What was cut short says nothing of the whole. */

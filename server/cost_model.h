@@ -1,9 +1,9 @@
 /* What a picture will cost, from what others did cost: milliseconds of the render thread and of an encoder. Any thread.
  *
  * Measured per kind of picture (model, clear or clouded, from below or above, PNG or EXR) as a fixed part and one for each megapixel, both
- * fitted with weights that fade by a tenth with every measurement. What frames share (optics of a sun, sky, field, radiosity, droplets)
- * counts apart, and for nothing where a picture had the same of late; how long ago that may be follows from what stages say that they
- * reused. Lives in memory only.
+ * fitted with weights that fade by a tenth with every measurement. What frames share (optics of a sun, sky, field by type of
+ * cloud, radiosity, droplets) counts apart, and for nothing where a picture had the same of late; how long ago that may be follows from
+ * what stages say that they reused. Lives in memory only.
  *
  * A single odd measurement moves an estimate by no more than a tenth of fourfold, and estimates grow old: what was not measured for
  * COST_FRESH_MS is still good for an order but no reason to refuse anything (cost.fresh).

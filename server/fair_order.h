@@ -18,7 +18,7 @@
 #include <stddef.h>
 
 /* Own work is passed by what is cheaper and came within so many times its cost. */
-#define FAIR_ORDER_PATIENCE 4.0
+#define FAIR_ORDER_PATIENCE 3.0
 
 struct fair_client;
 
@@ -53,7 +53,8 @@ void fair_order_settle(struct fair_order *order, struct fair_entry *entry, doubl
 /* Leaves without having been served. */
 void fair_order_drop(struct fair_order *order, struct fair_entry *entry);
 
-/* Cost of what would be served before an entry that came now, as far as anyone can know who does not know what will come. */
+/* Cost of what would be served before an entry that came now, as far as anyone can know who does not know what will come. cost_ms INFINITY:
+ * before the last of its client. */
 double fair_order_ahead_ms(const struct fair_order *order, const char *client, double cost_ms, double now_ms);
 
 #endif

@@ -288,8 +288,16 @@ static void write_queue(struct text *text, const struct metrics *metrics, const 
 	text_printf(text, "stratus_queue_depth %zu\n", now->queue_depth);
 	write_family(text, "queue_pixels", "gauge", "Pixels of those renders, layers counted apart.");
 	text_printf(text, "stratus_queue_pixels %.0f\n", now->queue_pixels);
-	write_family(text, "queue_limit", "gauge", "Renders that may wait for each.");
-	text_printf(text, "stratus_queue_limit %zu\n", now->queue_limit);
+	write_family(text, "queue_taken", "gauge", "Pictures accepted and not answered yet, whatever they wait for.");
+	text_printf(text, "stratus_queue_taken %zu\n", now->intake.taken);
+	write_family(text, "queue_limit", "gauge", "Pictures that may be accepted and not answered yet.");
+	text_printf(text, "stratus_queue_limit %zu\n", now->intake.places);
+	write_family(text, "queue_service_seconds", "gauge",
+		     "From one answer to the next while there was enough to do, of late; 0: not measured.");
+	text_printf(text, "stratus_queue_service_seconds %.6f\n", now->intake.service_ms * 1e-3);
+	write_family(text, "queue_margin", "gauge",
+		     "Service times by which answers may take longer than what was predicted to be done before them.");
+	text_printf(text, "stratus_queue_margin %.3f\n", now->intake.margin);
 	write_family(text, "requests_in_flight", "gauge", "Requests being answered, this one included.");
 	text_printf(text, "stratus_requests_in_flight %zu\n", now->requests_in_flight);
 	write_family(text, "queue_rejected", "counter", "Work refused, by reason.");
@@ -298,7 +306,7 @@ static void write_queue(struct text *text, const struct metrics *metrics, const 
 	write_family(text, "renders_ended", "counter", "Accepted renders that brought no picture, by reason.");
 	for (int i = 0; i < END_COUNT; i++)
 		text_printf(text, "stratus_renders_ended_total{reason=\"%s\"} %lu\n", end_names[i], metrics->ended[i]);
-	write_family(text, "wasted_render_seconds", "counter", "Time of the renderer on those, by reason.");
+	write_family(text, "wasted_render_seconds", "counter", "Time of the renderer and of encoders on those, by reason.");
 	for (int i = 0; i < END_COUNT; i++)
 		text_printf(text, "stratus_wasted_render_seconds_total{reason=\"%s\"} %.3f\n", end_names[i], metrics->wasted_ms[i] * 1e-3);
 	write_family(text, "cancelled", "counter", "Those of them that nobody waited for any more, by how far they had come.");

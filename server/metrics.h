@@ -11,6 +11,7 @@
 #include "server/connections.h"
 #include "server/image_cache.h"
 #include "server/problem.h"
+#include "server/intake.h"
 #include "server/render_queue.h"
 #include "server/renderer_care.h"
 #include "server/server_timing.h"
@@ -81,7 +82,8 @@ void metrics_count_tracing_end(struct metrics *metrics, enum metrics_end end);
 struct metrics_now {
 	const struct renderer_info *info;
 	bool ready; /* as /readyz says it */
-	size_t queue_depth, queue_limit, requests_in_flight;
+	size_t queue_depth, requests_in_flight;
+	struct intake_now intake;
 	double queue_pixels, queue_pixels_limit, backlog_ms;
 	struct connections_counts connections;
 	struct care_counts care;

@@ -198,6 +198,11 @@ double preparation_pixels(struct preparation *preparation)
 	return render_queue_pixels(preparation->waiting);
 }
 
+double preparation_backlog_ms(struct preparation *preparation)
+{
+	return render_queue_backlog_ms(preparation->waiting);
+}
+
 double preparation_busy_ms(const struct preparation *preparation)
 {
 	double since = preparation->busy_since_ms;

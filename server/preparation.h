@@ -38,6 +38,9 @@ bool preparation_needs(const struct preparation *preparation, const struct scene
 size_t preparation_depth(struct preparation *preparation);
 double preparation_pixels(struct preparation *preparation);
 
+/* Time that their renders will take, as predicted. Any thread. */
+double preparation_backlog_ms(struct preparation *preparation);
+
 /* Milliseconds that the job in work has taken so far, 0 when idle, and those of a typical one lately, 0 before the first. Any thread. */
 double preparation_busy_ms(const struct preparation *preparation);
 double preparation_typical_ms(const struct preparation *preparation);

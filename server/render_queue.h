@@ -58,6 +58,7 @@ struct render_job {
 	const struct renderer_info *device; /* that the answer speaks of; NULL: any */
 	int interruptions;                  /* by a context that was lost while it was rendered */
 	double spent_ms;                    /* of the render thread's time */
+	double encoded_ms;                  /* of a worker's, behind that */
 	double waited_ms;                   /* in queues */
 	struct frame frame;
 	struct sky_light light; /* likewise */

@@ -89,6 +89,8 @@ static enum render_outcome outcome_of(struct render_thread *thread, struct rende
 	/* A scene that does not fit says nothing about the next one: only a failing device turns the daemon's health. */
 	if (result == RENDER_OUT_OF_MEMORY)
 		return RENDER_OUTCOME_NO_MEMORY;
+	if (result == RENDER_NO_PROGRAM)
+		return RENDER_OUTCOME_FAILED;
 	thread->failures = result == RENDER_OK ? 0 : thread->failures + 1;
 	return result == RENDER_OK ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
 }

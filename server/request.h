@@ -55,7 +55,7 @@ struct request {
 	unsigned retry_after_s;  /* when the key may have more */
 	unsigned status;         /* answered; 0: not yet */
 	uint64_t bytes;          /* of the answer's body */
-	size_t memory_bytes;     /* that it was promised (admission.h) */
+	size_t memory_bytes;     /* of an answer of its own (admission.h) */
 	double late_ms;          /* of a request that is refused for it: so much later than it may be */
 	char scene[DIGEST_SIZE]; /* hash of the canonical scene that is asked for, for the log; empty: none */
 

@@ -40,6 +40,8 @@ static void write_json(struct text *text, const struct request *request, const c
 		add_json_member(text, "key", request->key);
 	if (*request->scene)
 		add_json_member(text, "scene", request->scene);
+	if (request->problem.kind != PROBLEM_NONE)
+		add_json_member(text, "problem", problem_name(request->problem.kind));
 	text_add(text, ",\"stages_ms\":{");
 	for (int i = 0; i < TIMING_COUNT; i++)
 		if (is_stage(timings, i)) {
@@ -80,6 +82,8 @@ static void write_text(struct text *text, const struct request *request, const c
 		add_text_value(text, "key", request->key);
 	if (*request->scene)
 		add_text_value(text, "scene", request->scene);
+	if (request->problem.kind != PROBLEM_NONE)
+		add_text_value(text, "problem", problem_name(request->problem.kind));
 	for (int i = 0; i < TIMING_COUNT; i++)
 		if (is_stage(timings, i))
 			text_printf(text, " %s_ms=%.3f%s", timing_names[i], timings->entry[i].milliseconds,

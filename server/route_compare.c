@@ -43,6 +43,7 @@ struct compare_run {
 struct compare_work {
 	struct work compare;
 	struct request *request;
+	struct promise promise;
 	struct compare_query query;
 	enum compare_form form;
 	struct scene mask_scene;
@@ -59,6 +60,7 @@ struct compare_work {
 static void work_destroy(void *context)
 {
 	struct compare_work *work = context;
+	admission_leave(work->request->service, &work->promise, false);
 	for (int i = 0; i < RUNS_MAX; i++) {
 		frame_finish(&work->run[i].job.frame);
 		if (work->run[i].scene)
@@ -167,12 +169,14 @@ static enum MHD_Result finish(struct request *request)
 
 static void hand_back(struct compare_work *work)
 {
+	admission_leave(work->request->service, &work->promise, work->ended->outcome == RENDER_OUTCOME_OK);
 	call_end_render(work->request, work->ended);
 }
 
 static void refuse(struct compare_work *work)
 {
 	work->refused = true;
+	admission_leave(work->request->service, &work->promise, false);
 	request_resume(work->request);
 }
 
@@ -189,6 +193,7 @@ static bool job_is_over(void *context)
 static bool encode(struct compare_work *work, const struct comparison *comparison)
 {
 	const struct image_api *images = work->request->service->images;
+	const struct image_watch watch = {job_is_over, work->ended};
 	char error[256] = "out of memory";
 	char *json = comparison_to_json(comparison);
 	bool ok = json != NULL;
@@ -196,9 +201,9 @@ static bool encode(struct compare_work *work, const struct comparison *compariso
 		work->answer = (struct image_buffer){(unsigned char *)json, strlen(json)};
 		return true;
 	}
-	ok = ok &&
-	     (work->form == FORM_PNG ? comparison_to_png : comparison_to_exr)(comparison, json, images, &work->answer, error, sizeof error);
-	if (!ok)
+	ok = ok && (work->form == FORM_PNG ? comparison_to_png : comparison_to_exr)(comparison, json, images, &watch, &work->answer, error,
+										    sizeof error);
+	if (!ok && !job_is_over(work->ended))
 		log_error("request %s: encoding a comparison failed: %s", work->request->id, error);
 	free(json);
 	return ok;
@@ -229,12 +234,17 @@ static void compare(struct work *base)
 	const double compared = clock_now_ms();
 	timings_set(&work->spent, TIMING_COMPARE, compared - start);
 	if (ok && !job_is_over(work->ended)) {
-		work->ended->outcome = encode(work, &comparison) ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
+		work->ended->outcome = RENDER_OUTCOME_FAILED;
+		if (encode(work, &comparison))
+			work->ended->outcome = RENDER_OUTCOME_OK;
 		timings_set(&work->spent, TIMING_ENCODE, clock_now_ms() - compared);
 	}
 	if (work->ended->outcome == RENDER_OUTCOME_OK)
 		job_is_over(work->ended);
+	work->ended->encoded_ms = clock_now_ms() - start;
 	comparison_finish(&comparison);
+	for (int i = 0; i < RUNS_MAX; i++)
+		frame_drop_pixels(&work->run[i].job.frame);
 	admission_keep(work->request, work->answer.size);
 	hand_back(work);
 }
@@ -287,9 +297,19 @@ static bool push(struct compare_work *work, struct compare_run *run)
 	return true;
 }
 
+static struct compare_run *run_to_decode(struct work *base)
+{
+	return (struct compare_run *)((char *)base - offsetof(struct compare_run, decode));
+}
+
+static bool waits_in_vain(struct work *base)
+{
+	return render_job_is_over(&run_to_decode(base)->job);
+}
+
 static void decode(struct work *base)
 {
-	struct compare_run *run = (struct compare_run *)((char *)base - offsetof(struct compare_run, decode));
+	struct compare_run *run = run_to_decode(base);
 	struct compare_work *work = run->work;
 	struct service *service = work->request->service;
 	run->job.waited_ms += clock_now_ms() - run->decoding_since_ms;
@@ -325,6 +345,7 @@ static bool start_run(struct compare_work *work)
 	run->job.abandoned = job_is_abandoned;
 	run->job.finished = on_rendered;
 	run->decode.run = decode;
+	run->decode.is_over = waits_in_vain;
 	admission_price(work->request, &run->job);
 	run->decoding_since_ms = clock_now_ms();
 	return scene_assets_take(service->maps, run->scene, &run->assets) ? push(work, run)
@@ -338,7 +359,7 @@ static bool enter(struct compare_work *work)
 	const struct scene *scenes[RUNS_MAX];
 	for (int i = 0; i < work->run_count; i++)
 		scenes[i] = work->run[work->order[i]].scene;
-	return admission_enter(work->request, scenes, work->run_count, NULL, work->deadline_ms);
+	return admission_enter(work->request, &work->promise, scenes, work->run_count, NULL, work->deadline_ms);
 }
 
 enum MHD_Result route_compare(struct request *request)

@@ -38,6 +38,7 @@ struct render_work {
 	struct request *request; /* no longer, for other threads, once its seat is left */
 	struct flight_seat seat;
 	struct flight flight;
+	struct promise promise;
 	struct render_job job; /* for the render thread */
 	struct work decode;    /* for the decoder, when a map is not in memory */
 	struct work encode;    /* for the worker */
@@ -51,7 +52,6 @@ struct render_work {
 	char key[DIGEST_SIZE], tag[ENTITY_TAG_SIZE];
 	bool may_be_found, may_be_kept; /* among the finished images */
 	bool is_kept;
-	double encode_ms;
 };
 
 static void work_release(void *context)
@@ -59,6 +59,8 @@ static void work_release(void *context)
 	struct render_work *work = context;
 	if (--work->holders > 0)
 		return;
+	if (work->service)
+		admission_leave(work->service, &work->promise, false);
 	finished_image_release(work->seat.image);
 	frame_finish(&work->job.frame);
 	scene_assets_finish(&work->input.scene, &work->assets);
@@ -191,7 +193,6 @@ static struct MHD_Response *create_response(struct request *request)
 	struct render_work *work = request->work;
 	struct finished_image *image = work->seat.image;
 	work->seat.image = NULL;
-	admission_keep(request, image->size);
 	metrics_count_picture(request->service->metrics, image->pixels);
 	return response_create_shared(request, image);
 }
@@ -235,7 +236,8 @@ static enum MHD_Result finish(struct request *request)
 	timings_add_optics(&request->timings, work->job.prepared_ms, work->job.prepared);
 	timings_add(&request->timings, TIMING_FIELD, work->decode_ms[0]);
 	timings_add(&request->timings, TIMING_SKY, work->decode_ms[1]); /* the ground is part of it */
-	timings_set(&request->timings, TIMING_ENCODE, work->encode_ms);
+	timings_set(&request->timings, TIMING_ENCODE, work->job.encoded_ms);
+	admission_keep(request, seat->image->size);
 	struct MHD_Response *response = create_response(request);
 	set_samples(response, work->job.frame.samples, work->job.frame.partial);
 	set_cache_status(response, work);
@@ -294,9 +296,16 @@ static void arrive(struct render_work *work, enum render_outcome outcome, struct
 {
 	work->job.outcome = outcome;
 	call_count_render(work->service, &work->job);
+	admission_leave(work->service, &work->promise, image != NULL); /* before those who wait may come again */
 	flight_arrive(&work->flight, outcome, image);
 	finished_image_release(image);
 	end_work(work);
+}
+
+static bool is_unwanted(void *context)
+{
+	struct render_work *work = context;
+	return !flight_is_wanted(&work->flight);
 }
 
 static struct finished_image *encode_frame(struct render_work *work)
@@ -304,10 +313,12 @@ static struct finished_image *encode_frame(struct render_work *work)
 	const struct frame *frame = &work->job.frame;
 	const struct image_metadata metadata = {
 		.scene_json = work->canonical, .request_id = work->id, .software = "stratus " RENDERER_VERSION};
+	const struct image_watch watch = {is_unwanted, work};
 	struct image_buffer file = {0};
 	char error[256] = "";
-	if (!work->service->images->encode(frame, &work->input.scene, &metadata, &file, error, sizeof error)) {
-		log_error("request %s: encoding failed: %s", work->id, error);
+	if (!work->service->images->encode(frame, &work->input.scene, &metadata, &watch, &file, error, sizeof error)) {
+		if (!is_unwanted(work))
+			log_error("request %s: encoding failed: %s", work->id, error);
 		return NULL;
 	}
 	return finished_image_create(work->tag, file.data, file.size, (double)frame->width * frame->height * frame->layer_count,
@@ -322,19 +333,21 @@ static void encode(struct work *base)
 	work->job.phase = RENDER_PHASE_ENCODING;
 	if (work->job.frame.partial)
 		flight_waive_deadlines(&work->flight); /* what was cut short for the deadline goes out, even if that passes now */
-	const bool wanted = flight_is_wanted(&work->flight), taken = wanted && frame_take_pixels(&work->job.frame);
+	bool wanted = !is_unwanted(work);
+	const bool taken = wanted && frame_take_pixels(&work->job.frame);
 	if (taken)
 		image = encode_frame(work);
+	wanted = image || !is_unwanted(work);
 	work->is_kept = image && work->may_be_kept && image_cache_keep(work->service->finished, image);
-	work->encode_ms = clock_now_ms() - start;
+	work->job.encoded_ms = clock_now_ms() - start;
 	if (image)
-		cost_model_learn_encoding(work->service->costs, &work->input.scene, work->encode_ms);
+		cost_model_learn_encoding(work->service->costs, &work->input.scene, work->job.encoded_ms);
 	frame_drop_pixels(&work->job.frame);
 	arrive(work,
-	       image    ? RENDER_OUTCOME_OK
-	       : taken  ? RENDER_OUTCOME_FAILED
-	       : wanted ? RENDER_OUTCOME_NO_MEMORY
-			: RENDER_OUTCOME_ABANDONED,
+	       image     ? RENDER_OUTCOME_OK
+	       : !wanted ? RENDER_OUTCOME_ABANDONED
+	       : taken   ? RENDER_OUTCOME_FAILED
+			 : RENDER_OUTCOME_NO_MEMORY,
 	       image);
 }
 
@@ -356,6 +369,7 @@ static void on_rendered(struct render_job *job)
 /* Ends the job that a full queue refused. */
 static void refuse(struct render_work *work)
 {
+	admission_leave(work->service, &work->promise, false);
 	flight_refuse(&work->flight);
 	end_work(work);
 }
@@ -365,9 +379,19 @@ static bool is_over(void *context)
 	return render_job_is_over(context);
 }
 
+static struct render_work *work_to_decode(struct work *base)
+{
+	return (struct render_work *)((char *)base - offsetof(struct render_work, decode));
+}
+
+static bool waits_in_vain(struct work *base)
+{
+	return render_job_is_over(&work_to_decode(base)->job);
+}
+
 static void decode(struct work *base)
 {
-	struct render_work *work = (struct render_work *)((char *)base - offsetof(struct render_work, decode));
+	struct render_work *work = work_to_decode(base);
 	struct service *service = work->service;
 	work->job.waited_ms += clock_now_ms() - work->decoding_since_ms;
 	work->job.outcome = RENDER_OUTCOME_FAILED;
@@ -390,7 +414,7 @@ static void start(struct render_work *work)
 	struct service *service = work->service;
 	struct request *request = work->request;
 	work->holders++;
-	if (!admission_enter(request, &work->job.scene, 1, NULL, work->seat.deadline_ms)) {
+	if (!admission_enter(request, &work->promise, &work->job.scene, 1, NULL, work->seat.deadline_ms)) {
 		refuse(work);
 		return;
 	}
@@ -421,6 +445,7 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	work->job.finished = on_rendered;
 	work->encode.run = encode;
 	work->decode.run = decode;
+	work->decode.is_over = waits_in_vain;
 	/* Suspended first: whoever works for it may be done before flight_board or start returns. */
 	request_suspend(request, finish);
 	switch (flight_board(service->flights, may_be_found ? work->tag : NULL, &work->flight, &work->job.deadline_ms, &work->seat)) {

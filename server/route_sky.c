@@ -23,12 +23,12 @@ struct sky_work {
 	struct render_job job; /* for the render thread */
 	struct work write;     /* for the worker */
 	struct request *request;
+	struct promise promise;
 	struct sky_query query;
 	struct sky_directions directions;
 	char tag[ENTITY_TAG_SIZE];
 	bool refused; /* the queue was full */
 	char *answer;
-	double write_ms;
 };
 
 static struct sky_work *work_of(struct render_job *job)
@@ -39,6 +39,7 @@ static struct sky_work *work_of(struct render_job *job)
 static void work_destroy(void *context)
 {
 	struct sky_work *work = context;
+	admission_leave(work->request->service, &work->promise, false);
 	free(work->job.light.radiance);
 	free(work->answer);
 	free(work);
@@ -104,7 +105,7 @@ static enum MHD_Result finish(struct request *request)
 		return call_send_render_failure(request, work->job.outcome, "The sky", "so many directions");
 	timings_set(&request->timings, TIMING_SKY, work->job.light.timing.milliseconds);
 	request->timings.entry[TIMING_SKY].reused = work->job.light.timing.reused;
-	timings_set(&request->timings, TIMING_ENCODE, work->write_ms);
+	timings_set(&request->timings, TIMING_ENCODE, work->job.encoded_ms);
 	struct MHD_Response *response = response_create(request, work->answer, strlen(work->answer));
 	work->answer = NULL;
 	return send_light(request, MHD_HTTP_OK, response);
@@ -115,6 +116,12 @@ static enum MHD_Result finish(struct request *request)
 static bool is_abandoned(struct render_job *job)
 {
 	return call_is_abandoned(work_of(job)->request);
+}
+
+static void hand_back(struct sky_work *work)
+{
+	admission_leave(work->request->service, &work->promise, work->job.outcome == RENDER_OUTCOME_OK);
+	call_end_render(work->request, &work->job);
 }
 
 static void write_answer(struct work *base)
@@ -129,8 +136,8 @@ static void write_answer(struct work *base)
 			work->job.outcome = RENDER_OUTCOME_FAILED;
 		}
 	}
-	work->write_ms = clock_now_ms() - start;
-	call_end_render(work->request, &work->job);
+	work->job.encoded_ms = clock_now_ms() - start;
+	hand_back(work);
 }
 
 static void on_computed(struct render_job *job)
@@ -141,7 +148,7 @@ static void on_computed(struct render_job *job)
 	if (job->outcome == RENDER_OUTCOME_OK)
 		worker_pool_wait(work->request->service->workers, &work->write);
 	else
-		call_end_render(work->request, job);
+		hand_back(work);
 }
 
 /* --- the way through ------------------------------------------------------------------------------------------------------------ */
@@ -157,13 +164,14 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	work->job.abandoned = is_abandoned;
 	work->job.finished = on_computed;
 	work->write.run = write_answer;
-	if (!admission_enter(request, &work->job.scene, 1, &work->directions, deadline_ms))
+	if (!admission_enter(request, &work->promise, &work->job.scene, 1, &work->directions, deadline_ms))
 		return response_send_problem(request);
 	admission_price(request, &work->job);
 	/* Suspended first: the render thread may be done before preparation_push returns. */
 	request_suspend(request, finish);
 	if (!preparation_push(request->service->preparation, &work->job)) {
 		work->refused = true;
+		admission_leave(request->service, &work->promise, false);
 		request_resume(request);
 	}
 	return MHD_YES;

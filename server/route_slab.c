@@ -103,7 +103,7 @@ static bool is_cancelled(void *context)
 	work->ask_ms = now + ASK_EVERY_MS;
 	work->stop = (int)reason_to_stop(work);
 	if (is_tracing(work))
-		worker_pool_sweep(work->request->service->tracers, waits_in_vain);
+		worker_pool_sweep(work->request->service->tracers);
 	return work->stop != CALL_OK;
 }
 
@@ -197,6 +197,7 @@ static enum MHD_Result enqueue(struct request *request)
 	struct slab_work *work = request->work;
 	const struct service *service = request->service;
 	work->work.run = run;
+	work->work.is_over = waits_in_vain;
 	work->queued_ms = clock_now_ms();
 	/* Suspended first: a worker may be done before worker_pool_try returns. */
 	request_suspend(request, finish);

@@ -51,7 +51,7 @@ enum MHD_Result route_metrics(struct request *request)
 		.connections_limit = (size_t)service->config->connections,
 		.memory_bytes = service->memory_bytes,
 		.memory_limit = (size_t)service->config->memory_mb << 20,
-		.queue_limit = (size_t)service->config->queue_length,
+		.intake = intake_look(service->intake),
 		.requests_in_flight = service->in_flight,
 		.keys = service->keys,
 		.certificate_expiry = tls_expiry(),

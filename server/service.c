@@ -81,9 +81,15 @@ static bool open_assets(struct service *service)
 	return service->assets && service->maps && service->decoder;
 }
 
-static struct render_queue_limits queue_limits(const struct config *config)
+static struct render_queue_limits queue_limits(const struct config *config, int jobs)
 {
-	return (struct render_queue_limits){(size_t)config->queue_length, 1e6 * config->queue_mpixels};
+	return (struct render_queue_limits){(size_t)jobs, 1e6 * config->queue_mpixels};
+}
+
+/* What waits for droplets or maps leaves places to what could be rendered at once. */
+static int side_line_length(const struct config *config)
+{
+	return (config->queue_length + 1) / 2;
 }
 
 /* What was begun is the render thread's to end. */
@@ -114,6 +120,7 @@ static void drop_over(void *context)
 	for (struct render_job *job; (job = render_queue_remove(service->queue, is_over, NULL));)
 		job->finished(job);
 	preparation_drop_over(service->preparation);
+	worker_pool_sweep(service->decoders);
 	drop_wrong(service);
 }
 
@@ -130,7 +137,8 @@ struct service *service_create(const struct config *config)
 	service->metrics = metrics_create();
 	service->finished = image_cache_create((size_t)config->images_mb << 20);
 	service->flights = service->finished ? flights_create(service->finished) : NULL;
-	const struct render_queue_limits limits = queue_limits(config);
+	service->intake = intake_create((size_t)config->queue_length);
+	const struct render_queue_limits limits = queue_limits(config, config->queue_length);
 	service->queue = render_queue_create(&limits);
 	service->costs = cost_model_create();
 	const struct connections_params watched = {.total = (size_t)config->connections,
@@ -142,9 +150,9 @@ struct service *service_create(const struct config *config)
 	service->workers = worker_pool_create(workers, 2 * workers, 0);
 	service->computers = worker_pool_create(COMPUTER_COUNT, (size_t)config->queue_length, COMPUTER_NICE);
 	service->tracers = worker_pool_create(1, SERVICE_TRACINGS_MAX, TRACER_NICE);
-	service->decoders = worker_pool_create(1, (size_t)config->queue_length, DECODER_NICE);
-	const bool pools = service->connections && service->costs && service->flights && service->workers && service->computers &&
-			   service->tracers && service->decoders;
+	service->decoders = worker_pool_create(1, (size_t)side_line_length(config), DECODER_NICE);
+	const bool pools = service->connections && service->intake && service->costs && service->flights && service->workers &&
+			   service->computers && service->tracers && service->decoders;
 	service->keys = api_keys_create(config->keys);
 	const bool guarded = service->keys && (!config->tls_cert || tls_load(config->tls_cert, config->tls_key));
 	if (pools && guarded && open_assets(service) && service->metrics && service->queue && http_start(service) &&
@@ -159,7 +167,7 @@ static bool finish_start(struct service *service)
 {
 	if (!service->pixel_version)
 		service->pixel_version = pixel_version(service);
-	const struct render_queue_limits limits = queue_limits(service->config);
+	const struct render_queue_limits limits = queue_limits(service->config, side_line_length(service->config));
 	if (!service->preparation)
 		service->preparation = preparation_create(render_thread_droplets(service->render_thread), service->queue, &limits);
 	return service->pixel_version && service->preparation;
@@ -230,6 +238,7 @@ void service_destroy(struct service *service)
 	asset_maps_destroy(service->maps);
 	asset_store_destroy(service->assets);
 	render_queue_destroy(service->queue);
+	intake_destroy(service->intake);
 	cost_model_destroy(service->costs);
 	connections_destroy(service->connections);
 	metrics_destroy(service->metrics);

@@ -6,10 +6,11 @@
 #include "server/api_keys.h"
 #include "server/asset_maps.h"
 #include "server/config.h"
-#include "server/decoder.h"
 #include "server/connections.h"
 #include "server/cost_model.h"
+#include "server/decoder.h"
 #include "server/flight.h"
+#include "server/intake.h"
 #include "server/metrics.h"
 #include "server/preparation.h"
 #include "server/render_queue.h"
@@ -37,6 +38,7 @@ struct service {
 	struct connections *connections;
 	struct cost_model *costs;
 	struct metrics *metrics;
+	struct intake *intake; /* places of all that is accepted */
 	struct render_queue *queue;
 	struct render_thread *_Atomic render_thread;
 	struct preparation *preparation; /* once ready */
@@ -59,7 +61,7 @@ struct service {
 
 	unsigned long wrong_seen;    /* golden renders that failed; of the connections' thread */
 	_Atomic size_t in_flight;    /* requests read to their end and not answered to theirs */
-	_Atomic size_t memory_bytes; /* promised to pictures in work (admission.h) */
+	_Atomic size_t memory_bytes; /* promised to pictures in work, and of their answers (admission.h) */
 	_Atomic size_t suspended;    /* those of them that others work for */
 	_Atomic double tracing_ms;   /* what the last tracing took */
 	_Atomic double computing_ms; /* what the last call did that computers worked for */

@@ -114,11 +114,11 @@ void worker_pool_wait(struct worker_pool *pool, struct work *work)
 }
 
 /* Takes one piece of work that is over out of those that wait. */
-static struct work *take_over(struct worker_pool *pool, bool (*is_over)(struct work *work))
+static struct work *take_over(struct worker_pool *pool)
 {
 	pthread_mutex_lock(&pool->mutex);
 	struct work **link = &pool->first;
-	while (*link && !is_over(*link))
+	while (*link && !((*link)->is_over && (*link)->is_over(*link)))
 		link = &(*link)->next;
 	struct work *work = *link;
 	if (work) {
@@ -132,9 +132,9 @@ static struct work *take_over(struct worker_pool *pool, bool (*is_over)(struct w
 	return work;
 }
 
-void worker_pool_sweep(struct worker_pool *pool, bool (*is_over)(struct work *work))
+void worker_pool_sweep(struct worker_pool *pool)
 {
-	for (struct work *work; (work = take_over(pool, is_over));)
+	for (struct work *work; (work = take_over(pool));)
 		work->run(work);
 }
 

@@ -11,7 +11,8 @@
 /* Part of a larger struct that says what is to be done; belongs to its maker, and is not touched after `run` was called. */
 struct work {
 	void (*run)(struct work *work);
-	struct work *next; /* of the pool */
+	bool (*is_over)(struct work *work); /* late, or does nobody wait for it any more? Quick; NULL: never */
+	struct work *next;                  /* of the pool */
 };
 
 struct worker_pool;
@@ -29,8 +30,8 @@ bool worker_pool_try(struct worker_pool *pool, struct work *work);
 /* Hands work over, waiting for room. Never from the pool's own threads. */
 void worker_pool_wait(struct worker_pool *pool, struct work *work);
 
-/* Runs waiting work that is over (late, or nobody waits for it any more) at once, by the caller. `is_over` must be quick. */
-void worker_pool_sweep(struct worker_pool *pool, bool (*is_over)(struct work *work));
+/* Runs waiting work that is over at once, by the caller. */
+void worker_pool_sweep(struct worker_pool *pool);
 
 /* Work that waits now. */
 size_t worker_pool_waiting(struct worker_pool *pool);

@@ -217,7 +217,7 @@ const struct gl_context_info *gl_context_info(const struct gl_context *context)
 	return &context->info;
 }
 
-static _Thread_local bool memory_error;
+static _Thread_local bool memory_error, other_error;
 static _Thread_local enum gl_loss loss;
 
 static void gl_forget_loss(void)
@@ -251,6 +251,7 @@ bool gl_failed(const char *what)
 		if (error == GL_NO_ERROR)
 			break;
 		memory_error |= error == GL_OUT_OF_MEMORY;
+		other_error |= error != GL_OUT_OF_MEMORY;
 		log_error("gl: error 0x%04x (%s)", error, what);
 		failed = true;
 	}
@@ -265,4 +266,11 @@ enum gl_loss gl_lost(void)
 bool gl_failed_for_memory(void)
 {
 	return memory_error;
+}
+
+bool gl_failed_otherwise(void)
+{
+	const bool failed = other_error;
+	other_error = false;
+	return failed;
 }

@@ -45,4 +45,7 @@ enum gl_loss gl_lost(void);
 /* True when the error last seen by gl_failed was GL_OUT_OF_MEMORY. Owner thread. */
 bool gl_failed_for_memory(void);
 
+/* True when gl_failed has seen an error of another kind since this was asked last. Owner thread. */
+bool gl_failed_otherwise(void);
+
 #endif

@@ -111,6 +111,15 @@ static GLuint compile(GLenum type, const struct source *source, const char *name
 	return shader;
 }
 
+static _Thread_local bool refused;
+
+bool pass_was_refused(void)
+{
+	const bool was_refused = refused;
+	refused = false;
+	return was_refused;
+}
+
 /* vertices: the vertex program, of fragment passes. */
 static bool link(struct pass *pass, const struct source *text, const struct source *vertices)
 {
@@ -159,8 +168,10 @@ struct pass *pass_create(const struct pass_compiler *compiler, const struct pass
 	pass->adds = desc->adds;
 	pass->compute = compiler->kind == PASS_COMPUTE || desc->outputs == 0;
 	if (!assemble(&source, compiler, desc, pass->compute ? GL_COMPUTE_SHADER : GL_FRAGMENT_SHADER) ||
-	    (!pass->compute && !assemble(&vertices, compiler, desc, GL_VERTEX_SHADER)) || !link(pass, &source, &vertices))
+	    (!pass->compute && !assemble(&vertices, compiler, desc, GL_VERTEX_SHADER)) || !link(pass, &source, &vertices)) {
+		refused = true;
 		goto fail;
+	}
 	look_up_uniforms(pass, desc);
 	if (!pass->compute) {
 		glCreateFramebuffers(1, &pass->framebuffer);

@@ -34,6 +34,9 @@ struct pass;
 
 /* Compiles and links. NULL after log lines with the driver's whole message. */
 struct pass *pass_create(const struct pass_compiler *compiler, const struct pass_desc *desc);
+
+/* Did a pass not compile or link, of the calling thread's, since this was asked last? */
+bool pass_was_refused(void);
 void pass_destroy(struct pass *pass);
 
 struct pass_run {

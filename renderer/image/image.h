@@ -48,15 +48,22 @@ struct image_rows {
 /* false stops the reading. */
 typedef bool image_rows_taker(void *context, const struct image_rows *rows);
 
+/* Asked between rows of a picture that is being written. */
+struct image_watch {
+	bool (*is_over)(void *context); /* true stops the writing */
+	void *context;
+};
+
 struct image_api {
 	const char *version; /* of this module and the libraries that decide about an image's bytes */
-	/* Encodes a frame as the scene's output asks (format, compression, type, bits). Any thread, several at once. false and a message in
-	 * `error` (at most error_size) on failure; buffer->data is then NULL. */
+	/* Encodes a frame as the scene's output asks (format, compression, type, bits). watch: NULL when nobody needs to be asked. Any
+	 * thread, several at once. false and a message in `error` (at most error_size) on failure or when it was stopped; buffer->data is
+	 * then NULL. */
 	bool (*encode)(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata,
-		       struct image_buffer *buffer, char *error, size_t error_size);
+		       const struct image_watch *watch, struct image_buffer *buffer, char *error, size_t error_size);
 	/* Encodes channels as an EXR, its type and compression those of the scene's output, its camera the scene's. Likewise. */
 	bool (*encode_planes)(const struct image_planes *planes, const struct scene *scene, const struct image_metadata *metadata,
-			      struct image_buffer *buffer, char *error, size_t error_size);
+			      const struct image_watch *watch, struct image_buffer *buffer, char *error, size_t error_size);
 	/* Reads the picture that picture_file_read found in an open file. Nothing but the reader of its format runs. Any thread, several at
 	 * once. false and a message in `error` when the file is damaged or `take` stopped it. */
 	bool (*decode)(int fd, const struct picture_file *file, image_rows_taker *take, void *context, char *error, size_t error_size);

@@ -66,6 +66,16 @@ void require(bool condition, const char *message)
 		throw std::runtime_error(message);
 }
 
+/* Rows that are written at once: a multiple of every EXR compressor's block, at most 32 lines. */
+constexpr int rows_at_once = 64;
+
+constexpr const char *unwanted = "nobody waits for it any more";
+
+bool is_wanted(const struct image_watch *watch)
+{
+	return !watch || !watch->is_over(watch->context);
+}
+
 /* --- PNG ------------------------------------------------------------------------------------------------------------------ */
 
 void append_be32(bytes &to, uint32_t value)
@@ -106,7 +116,8 @@ constexpr png_effort png_fast = {"rle", 1};
 /* Which of these is smaller depends on how much of the picture is flat; level 9 would save 2 % more in eight times the time. */
 constexpr png_effort png_small[] = {{"huffman", 1}, {"filtered", 6}};
 
-bytes encode_png_with(const png_effort &effort, const struct frame &frame, const struct image_metadata &metadata)
+bytes encode_png_with(const png_effort &effort, const struct frame &frame, const struct image_metadata &metadata,
+		      const struct image_watch *watch)
 {
 	const TypeDesc type = frame.type == PIXEL_U8 ? TypeDesc::UINT8 : TypeDesc::UINT16;
 	ImageSpec spec(frame.width, frame.height, 3, type);
@@ -119,13 +130,23 @@ bytes encode_png_with(const png_effort &effort, const struct frame &frame, const
 	OIIO::Filesystem::IOVecOutput proxy;
 	proxy.buffer().reserve(frame.bytes / 2);
 	auto out = open_output("png", spec, &proxy);
-	if (!out->write_image(type, frame.pixels))
-		throw std::runtime_error(out->geterror());
+	const size_t row_bytes = 3 * static_cast<size_t>(frame.width) * (frame.type == PIXEL_U8 ? 1 : 2);
+	const bytes blank(rows_at_once * row_bytes);
+	bool wanted = true;
+	for (int y = 0; y < frame.height; y += rows_at_once) {
+		/* libpng complains on standard error of pictures without an end: they get a black one, which takes no time. */
+		wanted = wanted && is_wanted(watch);
+		const unsigned char *rows = static_cast<const unsigned char *>(frame.pixels) + static_cast<size_t>(y) * row_bytes;
+		if (!out->write_scanlines(y, std::min(y + rows_at_once, frame.height), 0, type, wanted ? rows : blank.data()))
+			throw std::runtime_error(out->geterror());
+	}
 	close_output(*out);
+	require(wanted, unwanted);
 	return std::move(proxy.buffer());
 }
 
-bytes encode_png(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata)
+bytes encode_png(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata,
+		 const struct image_watch *watch)
 {
 	const int bits = frame.type == PIXEL_U8 ? 8 : 16;
 	require(frame.type != PIXEL_F32 && bits == scene.output.bits, "a PNG needs a developed frame of the depth the scene asks for");
@@ -133,10 +154,10 @@ bytes encode_png(const struct frame &frame, const struct scene &scene, const str
 
 	bytes png;
 	if (scene.output.png_compression == PNG_FAST) {
-		png = encode_png_with(png_fast, frame, metadata);
+		png = encode_png_with(png_fast, frame, metadata, watch);
 	} else {
 		for (const png_effort &effort : png_small) {
-			bytes other = encode_png_with(effort, frame, metadata);
+			bytes other = encode_png_with(effort, frame, metadata, watch);
 			if (png.empty() || other.size() < png.size())
 				png = std::move(other);
 		}
@@ -396,13 +417,13 @@ void pack_rows(int width, const std::vector<channel> &channels, int y, int y_end
 	}
 }
 
-bytes write_exr(const ImageSpec &spec, const std::vector<channel> &channels)
+bytes write_exr(const ImageSpec &spec, const std::vector<channel> &channels, const struct image_watch *watch)
 {
 	OIIO::Filesystem::IOVecOutput proxy;
 	auto out = open_output("exr", spec, &proxy);
 	bytes rows;
-	constexpr int rows_at_once = 64; /* a multiple of every compressor's block, at most 32 lines */
 	for (int y = 0; y < spec.height; y += rows_at_once) {
+		require(is_wanted(watch), unwanted);
 		const int y_end = std::min(y + rows_at_once, spec.height);
 		pack_rows(spec.width, channels, y, y_end, rows);
 		if (!out->write_scanlines(y, y_end, 0, TypeDesc::UNKNOWN, rows.data()))
@@ -412,7 +433,8 @@ bytes write_exr(const ImageSpec &spec, const std::vector<channel> &channels)
 	return std::move(proxy.buffer());
 }
 
-bytes encode_exr(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata)
+bytes encode_exr(const struct frame &frame, const struct scene &scene, const struct image_metadata &metadata,
+		 const struct image_watch *watch)
 {
 	require(frame.type == PIXEL_F32, "an EXR needs a scene-linear frame");
 	const picture_size size = {frame.width, frame.height};
@@ -420,16 +442,17 @@ bytes encode_exr(const struct frame &frame, const struct scene &scene, const str
 	const bool clamped = choose_types(size, scene.output.exr_type, channels);
 	ImageSpec spec = exr_spec(size, scene, metadata, channels, clamped);
 	describe_frame(spec, frame);
-	return write_exr(spec, channels);
+	return write_exr(spec, channels, watch);
 }
 
-bytes encode_exr_planes(const struct image_planes &planes, const struct scene &scene, const struct image_metadata &metadata)
+bytes encode_exr_planes(const struct image_planes &planes, const struct scene &scene, const struct image_metadata &metadata,
+			const struct image_watch *watch)
 {
 	require(planes.width >= 1 && planes.height >= 1 && planes.count >= 1, "there are no planes");
 	const picture_size size = {planes.width, planes.height};
 	std::vector<channel> channels = list_channels(planes);
 	const bool clamped = choose_types(size, scene.output.exr_type, channels);
-	return write_exr(exr_spec(size, scene, metadata, channels, clamped), channels);
+	return write_exr(exr_spec(size, scene, metadata, channels, clamped), channels, watch);
 }
 
 /* --- reading --------------------------------------------------------------------------------------------------------------- */
@@ -589,19 +612,20 @@ template <typename Encoder> bool deliver(struct image_buffer *buffer, char *erro
 	return false;
 }
 
-bool encode(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata, struct image_buffer *buffer,
-	    char *error, size_t error_size) noexcept
+bool encode(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata, const struct image_watch *watch,
+	    struct image_buffer *buffer, char *error, size_t error_size) noexcept
 {
 	return deliver(buffer, error, error_size, [&] {
 		check_frame(*frame);
-		return scene->output.format == IMAGE_PNG ? encode_png(*frame, *scene, *metadata) : encode_exr(*frame, *scene, *metadata);
+		return scene->output.format == IMAGE_PNG ? encode_png(*frame, *scene, *metadata, watch)
+							 : encode_exr(*frame, *scene, *metadata, watch);
 	});
 }
 
 bool encode_planes(const struct image_planes *planes, const struct scene *scene, const struct image_metadata *metadata,
-		   struct image_buffer *buffer, char *error, size_t error_size) noexcept
+		   const struct image_watch *watch, struct image_buffer *buffer, char *error, size_t error_size) noexcept
 {
-	return deliver(buffer, error, error_size, [&] { return encode_exr_planes(*planes, *scene, *metadata); });
+	return deliver(buffer, error, error_size, [&] { return encode_exr_planes(*planes, *scene, *metadata, watch); });
 }
 
 bool decode(int fd, const struct picture_file *file, image_rows_taker *take, void *context, char *error, size_t error_size) noexcept

@@ -102,7 +102,8 @@ static void count_densities(const struct field_stage *stage, const struct coarse
 	glGetNamedBufferSubData(stage->histogram, 0, HISTOGRAM_BINS * sizeof(unsigned), field->histogram);
 }
 
-static struct coarse_field *coarse_field_compute(const struct field_stage *stage, const struct scene_clouds *clouds)
+static struct coarse_field *coarse_field_compute(const struct field_stage *stage, struct stage_context *context,
+						 const struct scene_clouds *clouds)
 {
 	struct coarse_field *field = calloc(1, sizeof *field);
 	if (!field)
@@ -111,7 +112,7 @@ static struct coarse_field *coarse_field_compute(const struct field_stage *stage
 	field->histogram = calloc(HISTOGRAM_BINS, sizeof *field->histogram);
 	if (!field->histogram || !texture_init(&field->coarse, resolution, resolution, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS) ||
 	    !texture_init(&field->detail, FIELD_DETAIL_SIDE, FIELD_DETAIL_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS) ||
-	    !field_noise_run(&stage->noise, clouds, &field->coarse, &field->detail)) {
+	    !field_noise_run(&stage->noise, context, clouds, &field->coarse, &field->detail)) {
 		coarse_field_destroy(field);
 		return NULL;
 	}
@@ -163,7 +164,7 @@ static const struct coarse_field *coarse_field_get(const struct field_stage *sta
 		return field;
 	context->reused = false;
 	const struct scene_map *map = scene->clouds.map.map;
-	field = map ? coarse_field_of_map(map, scene->clouds.resolution) : coarse_field_compute(stage, &scene->clouds);
+	field = map ? coarse_field_of_map(map, scene->clouds.resolution) : coarse_field_compute(stage, context, &scene->clouds);
 	if (!field ||
 	    !cache_keep(context->cache, &key, field, texture_bytes(&field->coarse) + texture_bytes(&field->detail), coarse_field_destroy))
 		return NULL;
@@ -384,13 +385,15 @@ static bool thickness_get(const struct field_stage *stage, struct stage_context 
 		return false;
 	maps->thickness = &thickness->thickness;
 	maps->smooth = &thickness->smooth;
+	if (stage_is_stopped(context))
+		return false;
 	if (!from_above) {
 		maps->sides = side_light_get(&stage->sides, context, scene, maps->thickness);
 		return maps->sides;
 	}
 	maps->height = height_field_get(stage, context, scene, coarse);
-	maps->light = maps->height ? height_light_get(&stage->light, context, scene, maps->height) : NULL;
-	maps->puffs = maps->light ? height_puffs_get(context) : NULL;
+	maps->light = maps->height && !stage_is_stopped(context) ? height_light_get(&stage->light, context, scene, maps->height) : NULL;
+	maps->puffs = maps->light && !stage_is_stopped(context) ? height_puffs_get(context) : NULL;
 	return maps->puffs;
 }
 
@@ -423,18 +426,14 @@ bool field_stage_run(const struct field_stage *stage, struct stage_context *cont
 	}
 	stage_upload_block(context);
 	const struct coarse_field *coarse = coarse_field_get(stage, context, scene);
-	if (!coarse) {
-		log_error("field: out of memory");
-		return false;
-	}
+	if (!coarse)
+		return stage_fails(context, "field");
 	fill_threshold(&context->block, &scene->clouds, coarse->histogram);
 	stage_upload_block(context);
 	maps->coarse = &coarse->coarse;
 	maps->detail = &coarse->detail;
 	if (!thickness_get(stage, context, scene, coarse, from_above, maps) ||
-	    (!from_above && !packed_maps_get(stage, context, &scene->clouds, maps))) {
-		log_error("field: out of memory");
-		return false;
-	}
+	    (!from_above && !packed_maps_get(stage, context, &scene->clouds, maps)))
+		return stage_fails(context, "field");
 	return true;
 }

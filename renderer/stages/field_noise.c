@@ -121,6 +121,7 @@ static const double octave_shear = 0.012;
 
 struct pyramid {
 	const struct field_noise *noise;
+	struct stage_context *context;
 	const struct scene_clouds *clouds;
 	double tile;     /* m */
 	uint32_t seed;   /* of the ingredient */
@@ -254,7 +255,7 @@ static bool pyramid_run(const struct pyramid *p, const struct texture *shape, st
 	bool ok = true;
 	for (int side = p->first; ok && side <= p->last; side *= 2) {
 		const bool first = side == p->first, last = side == p->last;
-		ok = last || texture_init(&finer, side, side, p->format, TEXTURE_REPEAT);
+		ok = !stage_is_stopped(p->context) && (last || texture_init(&finer, side, side, p->format, TEXTURE_REPEAT));
 		if (!ok)
 			break;
 		struct pass_run run = {.targets = (struct texture *[]){last ? target : &finer}, .samplers = {&sum, shape}};
@@ -416,10 +417,12 @@ static bool shape_run(const struct field_noise *noise, const struct scene_clouds
 	return true;
 }
 
-static bool coarse_run(const struct field_noise *noise, const struct scene_clouds *clouds, struct texture *coarse)
+static bool coarse_run(const struct field_noise *noise, struct stage_context *context, const struct scene_clouds *clouds,
+		       struct texture *coarse)
 {
 	const struct cloud_kind *kind = &kinds[clouds->type];
 	struct pyramid p = {.noise = noise,
+			    .context = context,
 			    .clouds = clouds,
 			    .tile = clouds->tile_m,
 			    .seed = clouds->seed ^ 0x5bd1e995u,
@@ -469,11 +472,13 @@ static void detail_cells_run(const struct field_noise *noise, const struct scene
 	pass_run(noise->passes[layer_pass(clouds, i)], &run);
 }
 
-static bool detail_run(const struct field_noise *noise, const struct scene_clouds *clouds, struct texture *detail)
+static bool detail_run(const struct field_noise *noise, struct stage_context *context, const struct scene_clouds *clouds,
+		       struct texture *detail)
 {
 	const struct cloud_kind *kind = &kinds[clouds->type];
 	const double tile = detail_tile(clouds);
 	const struct pyramid p = {.noise = noise,
+				  .context = context,
 				  .clouds = clouds,
 				  .tile = tile,
 				  .seed = clouds->seed ^ 0x6c078965u,
@@ -497,7 +502,8 @@ static bool detail_run(const struct field_noise *noise, const struct scene_cloud
 	return ok;
 }
 
-bool field_noise_run(const struct field_noise *noise, const struct scene_clouds *clouds, struct texture *coarse, struct texture *detail)
+bool field_noise_run(const struct field_noise *noise, struct stage_context *context, const struct scene_clouds *clouds,
+		     struct texture *coarse, struct texture *detail)
 {
-	return coarse_run(noise, clouds, coarse) && detail_run(noise, clouds, detail);
+	return coarse_run(noise, context, clouds, coarse) && detail_run(noise, context, clouds, detail);
 }

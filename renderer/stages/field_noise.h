@@ -29,7 +29,9 @@ struct field_noise_profile field_noise_profile_of(enum cloud_type type);
 /* Fills in the block's cloud_field, cloud_drift and cloud_detail. */
 void field_noise_fill_block(struct scene_block *block, const struct scene_clouds *clouds);
 
-/* Fills level 0 of the field and of its detail, as the block, which the passes must see, says. false when out of memory. */
-bool field_noise_run(const struct field_noise *noise, const struct scene_clouds *clouds, struct texture *coarse, struct texture *detail);
+/* Fills level 0 of the field and of its detail, as the block, which the passes must see, says. false when out of memory, or
+ * stopped. */
+bool field_noise_run(const struct field_noise *noise, struct stage_context *context, const struct scene_clouds *clouds,
+		     struct texture *coarse, struct texture *detail);
 
 #endif

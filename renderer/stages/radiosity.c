@@ -162,10 +162,11 @@ static struct result *result_compute(const struct radiosity_stage *stage, struct
 		return NULL;
 	}
 	paint_planes(stage, &planes, ground, sky, field, slab_rows);
-	for (int i = 0; i < PLANE_COUNT; i++)
+	const bool wanted = !stage_is_stopped(context);
+	for (int i = 0; wanted && i < PLANE_COUNT; i++)
 		if (i != CLOUD_DIRECT)
 			read_plane(&planes, i);
-	const bool ok = solve(&planes, scene, &context->block, kernel, &result->solution) &&
+	const bool ok = wanted && solve(&planes, scene, &context->block, kernel, &result->solution) &&
 			upload_plane(&planes, planes.ground_received, &result->ground_received) &&
 			upload_plane(&planes, planes.cloud_received, &result->cloud_received);
 	planes_finish(&planes);
@@ -209,8 +210,7 @@ bool radiosity_stage_run(const struct radiosity_stage *stage, struct stage_conte
 		stage_upload_block(context);
 		result = result_compute(stage, context, scene, ground, sky, field, slab_rows);
 		if (!result || !cache_keep(context->cache, &key, result, 2 * texture_bytes(&result->ground_received), result_destroy)) {
-			log_error("radiosity: out of memory");
-			return false;
+			return stage_fails(context, "radiosity");
 		}
 	}
 	const struct radiosity_solution *solution = &result->solution;

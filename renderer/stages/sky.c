@@ -154,23 +154,23 @@ static void gather_again(const struct sky_stage *stage, const struct texture *tr
 	gather(stage->passes[PASS_MULTISCATTER_AGAIN], run, to);
 }
 
-static bool compute_moments(const struct sky_stage *stage, struct air_tables *air)
+static bool compute_moments(const struct sky_stage *stage, struct stage_context *context, struct air_tables *air)
 {
 	struct texture before[MOMENT_COUNT] = {{0}}, ground = {0};
-	const bool ok = moments_init(air->moments) && moments_init(before) && texture_init(&ground, MULTISCATTER_W, 1, TEXTURE_RGBA32F, 0);
-	if (ok) {
+	bool ok = moments_init(air->moments) && moments_init(before) && texture_init(&ground, MULTISCATTER_W, 1, TEXTURE_RGBA32F, 0);
+	if (ok)
 		gather(stage->passes[PASS_MULTISCATTER], (struct pass_run){.samplers = {&air->transmittance}}, air->moments);
-		for (int i = 0; i < GATHERINGS; i++) {
-			gather_again(stage, &air->transmittance, &ground, air->moments, before);
-			gather_again(stage, &air->transmittance, &ground, before, air->moments);
-		}
+	for (int i = 0; ok && i < GATHERINGS; i++) {
+		gather_again(stage, &air->transmittance, &ground, air->moments, before);
+		gather_again(stage, &air->transmittance, &ground, before, air->moments);
+		ok = !stage_is_stopped(context);
 	}
 	texture_finish(&ground);
 	moments_finish(before);
 	return ok;
 }
 
-static struct air_tables *air_tables_compute(const struct sky_stage *stage)
+static struct air_tables *air_tables_compute(const struct sky_stage *stage, struct stage_context *context)
 {
 	struct air_tables *air = calloc(1, sizeof *air);
 	if (!air)
@@ -180,7 +180,7 @@ static struct air_tables *air_tables_compute(const struct sky_stage *stage)
 		return NULL;
 	}
 	pass_run(stage->passes[PASS_TRANSMITTANCE], &(struct pass_run){.targets = (struct texture *[]){&air->transmittance}});
-	if (!compute_moments(stage, air)) {
+	if (!compute_moments(stage, context, air)) {
 		air_tables_destroy(air);
 		return NULL;
 	}
@@ -201,7 +201,7 @@ static const struct air_tables *air_tables_get(const struct sky_stage *stage, st
 	if (air)
 		return air;
 	context->reused = false;
-	air = air_tables_compute(stage);
+	air = air_tables_compute(stage, context);
 	if (!air || !cache_keep(context->cache, &key, air,
 				texture_bytes(&air->transmittance) + MOMENT_COUNT * texture_bytes(&air->moments[0]), air_tables_destroy))
 		return NULL;
@@ -265,7 +265,7 @@ static void sun_irradiance(const struct scene_block *block, double height, doubl
 		irradiance[band] = visible * block->solar_irradiance[band] * exp(-depth[band]);
 }
 
-static struct sky_view *sky_view_compute(const struct sky_stage *stage, const struct stage_context *context, const struct air_tables *air,
+static struct sky_view *sky_view_compute(const struct sky_stage *stage, struct stage_context *context, const struct air_tables *air,
 					 double cloud_height, double camera_height)
 {
 	struct sky_view *view = calloc(1, sizeof *view);
@@ -280,7 +280,8 @@ static struct sky_view *sky_view_compute(const struct sky_stage *stage, const st
 	struct pass_run run = run_with_air(&air->transmittance, air->moments);
 	run.targets = targets;
 	pass_run(stage->passes[PASS_VIEW], &run);
-	if (!diffuse_irradiance(stage, air, cloud_height, view->diffuse_cloud) || !diffuse_irradiance(stage, air, 0, view->diffuse_ground))
+	if (stage_is_stopped(context) || !diffuse_irradiance(stage, air, cloud_height, view->diffuse_cloud) ||
+	    !diffuse_irradiance(stage, air, 0, view->diffuse_ground))
 		goto fail;
 	sun_irradiance(&context->block, cloud_height, view->sun_cloud);
 	sun_irradiance(&context->block, 0, view->sun_ground);
@@ -327,10 +328,8 @@ bool sky_stage_run(const struct sky_stage *stage, struct stage_context *context,
 	stage_upload_block(context);
 	const struct air_tables *air = air_tables_get(stage, context, scene, mean_albedo);
 	const struct sky_view *view = air ? sky_view_get(stage, context, scene, mean_albedo, air) : NULL;
-	if (!view) {
-		log_error("sky: out of memory");
-		return false;
-	}
+	if (!view)
+		return stage_fails(context, "sky");
 	*tables = (struct sky_tables){.transmittance = &air->transmittance,
 				      .total = &view->tables[0],
 				      .near = &view->tables[1],
@@ -407,10 +406,8 @@ bool sky_stage_run_directions(const struct sky_stage *stage, struct stage_contex
 	light->radiance = malloc((size_t)directions->view_count * (size_t)directions->azimuth_count * 3 * sizeof *light->radiance);
 	const struct air_tables *air = light->radiance ? air_tables_get(stage, context, scene, mean_albedo) : NULL;
 	if (!air || !diffuse_irradiance(stage, air, 0, light->diffuse_irradiance) ||
-	    !radiance_along(stage, context, air, directions, light->radiance)) {
-		log_error("sky: out of memory");
-		return false;
-	}
+	    !radiance_along(stage, context, air, directions, light->radiance))
+		return stage_fails(context, "sky");
 	sun_irradiance(&context->block, 0, sun);
 	for (int band = 0; band < 3; band++) {
 		light->direct_transmittance[band] = sun[band] / colour_solar_irradiance[band];

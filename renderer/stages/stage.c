@@ -1,8 +1,25 @@
 #include "renderer/stages/stage.h"
 
+#include "renderer/log.h"
 #include "renderer/scene_map.h"
 
 #include <epoxy/gl.h>
+
+bool stage_is_stopped(struct stage_context *context)
+{
+	if (!context->cancelled || context->stopped)
+		return context->stopped;
+	glFinish();
+	context->stopped = context->cancelled(context->cancel_context);
+	return context->stopped;
+}
+
+bool stage_fails(const struct stage_context *context, const char *stage)
+{
+	if (!context->stopped)
+		log_error("%s: out of memory", stage);
+	return false;
+}
 
 void stage_upload_block(struct stage_context *context)
 {

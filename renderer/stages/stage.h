@@ -19,7 +19,17 @@ struct stage_context {
 	struct droplet_store *droplets;
 	const struct droplet_tables *tables; /* of the frame's droplets, held (droplets_get, droplets_release) */
 	bool reused;                         /* set false by a stage that computed anything */
+	renderer_cancelled *cancelled;       /* asked by stage_is_stopped; NULL: nobody is to be asked */
+	void *cancel_context;
+	bool stopped; /* by whom was asked: nothing of this frame is wanted any more, and what is unfinished must not be kept */
 };
+
+/* To be asked between passes that take long: is there no use in going on? Waits for the passes so far, since those that are only queued
+ * would be done all the same. Once true it stays so; the stage then fails. */
+bool stage_is_stopped(struct stage_context *context);
+
+/* false, after a line that there was no memory for what the stage computes, unless it was stopped. */
+bool stage_fails(const struct stage_context *context, const char *stage);
 
 /* Makes the block as it stands visible to the passes that follow. */
 void stage_upload_block(struct stage_context *context);

@@ -9,6 +9,7 @@
  *   gl-error       the next question for errors is answered with one
  *   gl-memory      OpenGL has no memory for the next texture
  *   host-memory    BYTES: the next allocation of at least so many fails
+ *   shader         the driver takes the next shader for one that does not compile
  *   hang           S: the next pass holds the thread up for so many seconds
  *   hold           as long as the link exists: the next pass waits, and a link `held` says that it does
  *   growth         MB: the context takes so much memory, until it is destroyed
@@ -54,6 +55,7 @@ static bool find(const char *name, double *number, bool once)
 REAL(glGetGraphicsResetStatus);
 REAL(glTextureStorage2D);
 REAL(glGetError);
+REAL(glGetShaderiv);
 REAL(glUseProgram);
 REAL(glDrawArrays);
 REAL(glDispatchCompute);
@@ -112,6 +114,16 @@ static void wait_while_held(void)
 		said = said || symlink("1", held) == 0;
 	if (said)
 		unlink(held);
+}
+
+static void EPOXY_CALLSPEC faulty_glGetShaderiv(GLuint shader, GLenum what, GLint *value)
+{
+	double number;
+	RESTORE(glGetShaderiv);
+	real_glGetShaderiv(shader, what, value);
+	REPLACE(glGetShaderiv);
+	if (what == GL_COMPILE_STATUS && find("shader", &number, true))
+		*value = GL_FALSE;
 }
 
 static void EPOXY_CALLSPEC faulty_glUseProgram(GLuint program)
@@ -195,6 +207,7 @@ enum config_result __wrap_config_parse(int argc, char **argv, struct config *con
 	REPLACE(glGetGraphicsResetStatus);
 	REPLACE(glTextureStorage2D);
 	REPLACE(glGetError);
+	REPLACE(glGetShaderiv);
 	REPLACE(glUseProgram);
 	REPLACE(glDrawArrays);
 	REPLACE(glDispatchCompute);

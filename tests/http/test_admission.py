@@ -189,6 +189,25 @@ def test_who_leaves_the_line_is_dropped_at_once(served):
     assert running.recv(12) == b"HTTP/1.1 200"
 
 
+def test_places_are_for_all_that_is_accepted(start_daemon):
+    """What is rendered has one too, until it is answered; who leaves gives it back."""
+    daemon = start_daemon("--queue-length", "2")
+    assert daemon.metric("stratus_queue_limit") == 2
+    long = {"model": {"name": "reference", "samples": 4096}, "output": {"width": 320, "height": 240}}  # takes minutes
+    clients = []
+    for seed in range(2):
+        clients.append(send(daemon, {**long, "model": {**long["model"], "seed": seed}}))
+        assert wait_for(lambda: daemon.metric("stratus_queue_taken") == len(clients))
+    refused = daemon.render(PREVIEW)
+    assert refused.status == 503 and refused.json["type"] == "urn:stratus:problem:queue-full"
+    assert "--queue-length" in refused.json["detail"] and int(refused.headers["Retry-After"]) >= 1
+    clients.pop().close()
+    assert wait_for(lambda: daemon.metric("stratus_queue_taken") == 1)
+    assert daemon.render(PREVIEW).status == 200
+    clients.pop().close()
+    assert wait_for(lambda: daemon.metric("stratus_queue_taken") == 0)
+
+
 def test_a_thousand_clients_that_leave(served):
     """Some running renders are stopped, the others never begin; memory and descriptors are what they were."""
     waves, each = 5, 200

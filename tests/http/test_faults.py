@@ -114,6 +114,16 @@ def test_failures_on_end(faulty):
     assert faulty.render(scene, Cache_Control="no-cache").status == 200
 
 
+def test_an_error_is_no_lack_of_memory(faulty):
+    """Not even where memory is asked for, by a new sky and a picture of a new size."""
+    scene = {"sun": {"elevation_deg": 17.75}, "output": {"width": 77, "height": 55}}
+    faulty.fail("gl-error")
+    answer = faulty.render(scene)
+    assert faulty.has_failed("gl-error")
+    assert (answer.status, answer.json["type"]) == (500, "urn:stratus:problem:render-failed")
+    assert faulty.render(scene).status == 200
+
+
 def test_many_requests_over_a_reset(faulty):
     """Whoever waits notices only that it takes longer."""
     with concurrent.futures.ThreadPoolExecutor(6) as pool:
@@ -184,6 +194,25 @@ def test_no_memory_on_the_host(faulty):
     check_no_memory(faulty, faulty.render(scene))
     assert faulty.has_failed("host-memory")
     assert faulty.render(scene).status == 200
+
+
+# --- a shader that is compiled when it is needed ---------------------------------------------------------------------------------------
+
+
+def test_a_shader_that_does_not_compile(faulty):
+    """Pictures that take it are answered 500, not that there is no memory; the log names it, and no renderer is made anew for it."""
+    scene = {"camera": {"projection": "fisheye"}, "model": {"shading": "paper"}, "output": {"width": 48, "height": 48}}
+    resets, before = faulty.resets("failures"), len(faulty.text)
+    for seed in range(4):  # one more than failures on end that have the renderer made anew
+        faulty.fail("shader")
+        answer = faulty.render({**scene, "clouds": {"seed": 5000 + seed}})
+        assert faulty.has_failed("shader")
+        assert (answer.status, answer.json["type"]) == (500, "urn:stratus:problem:render-failed")
+    lines = faulty.text[before:].splitlines()
+    assert sum(bool(re.search(r" error +gl: compiling shaders/passes/[a-z_]+\.glsl failed", line)) for line in lines) == 4, lines
+    assert not any("out of memory" in line for line in lines)
+    assert faulty.render(scene).status == 200
+    assert faulty.resets("failures") == resets
 
 
 # --- the golden render ---------------------------------------------------------------------------------------------------------------

@@ -91,7 +91,10 @@ def test_exactly_one_line_a_request(talkative):
     for i, (method, target, _, _) in enumerate(calls):
         (record,) = [r for r in found if r["id"] == f"call-{i}"]
         answer = answers[record["id"]]
-        assert set(record) - {"scene"} == MEMBERS
+        assert set(record) - {"scene", "problem"} == MEMBERS
+        assert ("problem" in record) == (record["status"] >= 400)
+        if record["status"] >= 400 and method != "HEAD":
+            assert answer.json["type"] == "urn:stratus:problem:" + record["problem"]
         assert record["method"] == method and record["path"] == target.split("?")[0]
         assert record["status"] == answer.status
         assert record["bytes"] == len(answer.body), target

@@ -235,6 +235,25 @@ def test_the_others_get_it_when_one_leaves(standing, leaver):
     assert counts.are(abandoned=1)
 
 
+def test_memory_is_the_works_and_not_of_who_began_it(start_daemon):
+    """It is promised as long as anybody waits, and given back then."""
+    daemon = start_daemon()
+    scene = {"model": {"name": "reference", "samples": 4096}, "output": {"width": 320, "height": 240}}  # takes minutes
+    promised, counts = lambda: daemon.metric("stratus_picture_memory_bytes"), Counts(daemon)
+    clients = [send(daemon, scene, X_Timeout_Ms="3600000")]
+    assert counts.are(miss=1)
+    clients.append(send(daemon, scene, X_Timeout_Ms="3600000"))
+    assert counts.are(miss=1, shared=1)
+    before = promised()
+    assert before >= 320 * 240 * 3
+    clients[0].close()
+    assert counts.are(abandoned=1)
+    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2)  # the scrape is one
+    assert promised() == before and daemon.metric("stratus_queue_taken") == 1
+    clients[1].close()
+    assert wait_for(lambda: promised() == 0 and daemon.metric("stratus_queue_taken") == 0)
+
+
 def test_nothing_is_rendered_for_nobody(standing):
     daemon, scene, counts = standing, {"clouds": {"seed": 42008}, "output": SMALL}, Counts(standing)
     with daemon.busy():

@@ -119,7 +119,9 @@ def test_bad_pictures_are_known_early(daemon):
 FAULTY_MODULE = """
 #include "renderer/image/image.h"
 #include <dlfcn.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 static const struct image_api *real;
 
@@ -131,6 +133,20 @@ static bool decode(int fd, const struct picture_file *file, image_rows_taker *ta
 	while (file->width == 17)
 		__asm__ volatile("");
 	return real->decode(fd, file, take, context, error, size);
+}
+
+/* Pictures 19 wide are never written to their end. */
+static bool encode(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata, const struct image_watch *watch,
+		   struct image_buffer *buffer, char *error, size_t size)
+{
+	if (frame->width != 19)
+		return real->encode(frame, scene, metadata, watch, buffer, error, size);
+	fputs("a picture 19 wide is being written\\n", stderr);
+	while (!watch->is_over(watch->context))
+		usleep(1000);
+	snprintf(error, size, "stopped");
+	*buffer = (struct image_buffer){0};
+	return false;
 }
 
 const struct image_api *stratus_image_api(void);
@@ -145,6 +161,7 @@ const struct image_api *stratus_image_api(void)
 	real = entry();
 	faulty = *real;
 	faulty.decode = decode;
+	faulty.encode = encode;
 	return &faulty;
 }
 """
@@ -152,7 +169,7 @@ const struct image_api *stratus_image_api(void)
 
 @pytest.fixture(scope="module")
 def faulty(tmp_path_factory):
-    """A daemon whose library fails on pictures 13 and 17 wide; one 13 wide was stored before it began to fail."""
+    """A daemon whose library fails on pictures 13, 17 and 19 wide; one 13 wide was stored before it began to fail."""
     folder = tmp_path_factory.mktemp("faulty")
     source, module = folder / "faulty.c", folder / "faulty.so"
     source.write_text(FAULTY_MODULE.replace("REAL", f'"{BUILD / "stratus-image.so"}"'))
@@ -225,6 +242,55 @@ def test_renders_go_on_beside_it(faulty):
         assert wait_for(lambda: faulty.metric("stratus_requests_in_flight") > 1)
         assert faulty.render({"output": SMALL, "sun": {"elevation_deg": 21}}).status == 200
         assert hanging.result().status == 504
+
+
+def copies_of(process):
+    return [int(pid) for pid in pathlib.Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+
+
+def test_who_leaves_the_line_before_the_decoder_is_dropped_at_once(faulty):
+    """While a picture is being looked through, and whatever that takes; who stays is served when it is over."""
+    queued = 'stratus_cancelled_total{at="queued"}'
+    assert faulty.request("PUT", "/v1/assets/good", strip(4)).status in (201, 204)
+    before = faulty.metric(queued)
+    render = b"GET /v1/render?clouds.map=good&clouds.resolution=%d&output.width=32&output.height=24 HTTP/1.1\r\nHost: x\r\nX-Timeout-Ms: 3600000\r\n\r\n"
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        hanging = pool.submit(faulty.request, "PUT", "/v1/assets/bad", strip(17), {"X-Timeout-Ms": "3600000"})
+        assert wait_for(lambda: copies_of(decoder_of(faulty)))
+        leaving, staying = (socket.create_connection(("127.0.0.1", faulty.port), timeout=300) for _ in range(2))
+        leaving.sendall(render % 128)
+        staying.sendall(render % 256)
+        assert wait_for(lambda: faulty.metric("stratus_queue_taken") == 2)
+        leaving.close()
+        assert wait_for(lambda: faulty.metric("stratus_queue_taken") == 1)
+        assert faulty.metric(queued) == before + 1
+        assert not hanging.done()
+        (copy,) = copies_of(decoder_of(faulty))
+        os.kill(copy, signal.SIGKILL)
+        assert hanging.result().status == 422
+    assert staying.recv(12) == b"HTTP/1.1 200"
+    staying.close()
+
+
+def test_writing_a_picture_stops_when_nobody_waits(faulty):
+    """Asked between rows: when the deadline passes, and when the client leaves. Neither is a failure of the encoder."""
+    ended = {reason: f'stratus_renders_ended_total{{reason="{reason}"}}' for reason in ("expired", "abandoned", "failed")}
+    before = {reason: faulty.metric(name) for reason, name in ended.items()}
+    begun = lambda: faulty.log.read_text().count("a picture 19 wide is being written")
+    encoding, wasted = 'stratus_cancelled_total{at="encoding"}', 'stratus_wasted_render_seconds_total{reason="abandoned"}'
+    late = faulty.render({"output": {"width": 19, "height": 16}}, X_Timeout_Ms="2000")
+    assert_problem(late, 504, "deadline-passed")
+    assert wait_for(lambda: faulty.metric("stratus_queue_taken") == 0)
+    cancelled, seconds, earlier = faulty.metric(encoding), faulty.metric(wasted), begun()
+    with socket.create_connection(("127.0.0.1", faulty.port), timeout=60) as client:
+        client.sendall(b"GET /v1/render?output.width=19&output.height=17 HTTP/1.1\r\nHost: x\r\nX-Timeout-Ms: 3600000\r\n\r\n")
+        assert wait_for(lambda: begun() == earlier + 1)
+        time.sleep(0.2)
+    assert wait_for(lambda: faulty.metric("stratus_queue_taken") == 0)
+    assert {reason: faulty.metric(name) - before[reason] for reason, name in ended.items()} == {"expired": 1, "abandoned": 1, "failed": 0}
+    assert faulty.metric(encoding) == cancelled + 1
+    assert faulty.metric(wasted) >= seconds + 0.2
+    assert "encoding failed" not in faulty.log.read_text()
 
 
 def test_stored_picture_that_cannot_be_read_any_more(faulty):

@@ -151,6 +151,43 @@ static void shared_parts_count_once(void **state)
 	cost_model_destroy(model);
 }
 
+/* A scene of a field that nobody has asked for, of a type. */
+static struct scene new_field(enum cloud_type type)
+{
+	static uint32_t seed = 1000;
+	struct scene scene = scene_of(1000, 1000);
+	scene.clouds.type = type;
+	scene.clouds.seed = seed++;
+	return scene;
+}
+
+static void render_field(struct cost_model *model, enum cloud_type type, double field_ms)
+{
+	const struct scene scene = new_field(type);
+	struct render_job job = job_of(&scene, 100 + field_ms);
+	job.frame.timing[STAGE_FIELD] = (struct stage_timing){.milliseconds = field_ms};
+	expect(model, &scene);
+	cost_model_learn(model, &job);
+}
+
+/* Of types that were not seen yet the mean of the others is a guess, and no reason to refuse. */
+static void fields_are_told_apart_by_type(void **state)
+{
+	(void)state;
+	struct cost_model *model = cost_model_create();
+	for (int i = 0; i < 20; i++) {
+		render_field(model, CLOUD_STRATUS, 50);
+		render_field(model, CLOUD_ALTOCUMULUS, 150);
+	}
+	const struct scene stratus = new_field(CLOUD_STRATUS), altocumulus = new_field(CLOUD_ALTOCUMULUS),
+			   other = new_field(CLOUD_CIRROCUMULUS);
+	assert_float_equal(render_ms(model, &altocumulus) - render_ms(model, &stratus), 100, 2);
+	assert_true(render_ms(model, &other) > render_ms(model, &stratus) + 20 &&
+		    render_ms(model, &other) < render_ms(model, &altocumulus) - 20);
+	assert_false(cost_model_predict(model, &other, NULL, false).fresh);
+	cost_model_destroy(model);
+}
+
 /* How many of them the renderer keeps is learned from what it reused. */
 static void the_memory_behind_is_learned(void **state)
 {
@@ -222,15 +259,11 @@ static void pace_follows_load(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_line_is_found),
-		cmocka_unit_test(a_line_from_little),
-		cmocka_unit_test(odd_values_move_little),
-		cmocka_unit_test(kinds_are_told_apart),
-		cmocka_unit_test(shared_parts_count_once),
-		cmocka_unit_test(droplets_and_encoding),
-		cmocka_unit_test(the_memory_behind_is_learned),
-		cmocka_unit_test(pace_follows_load),
-		cmocka_unit_test(a_reference_counts_its_paths),
+		cmocka_unit_test(a_line_is_found),         cmocka_unit_test(a_line_from_little),
+		cmocka_unit_test(odd_values_move_little),  cmocka_unit_test(kinds_are_told_apart),
+		cmocka_unit_test(shared_parts_count_once), cmocka_unit_test(fields_are_told_apart_by_type),
+		cmocka_unit_test(droplets_and_encoding),   cmocka_unit_test(the_memory_behind_is_learned),
+		cmocka_unit_test(pace_follows_load),       cmocka_unit_test(a_reference_counts_its_paths),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -74,7 +74,7 @@ static struct image_buffer encode(const struct frame *frame, const struct scene 
 {
 	struct image_buffer buffer;
 	char error[256] = "";
-	if (!api->encode(frame, scene, &metadata, &buffer, error, sizeof error))
+	if (!api->encode(frame, scene, &metadata, NULL, &buffer, error, sizeof error))
 		fail_msg("%s", error);
 	return buffer;
 }
@@ -107,7 +107,7 @@ static void refuses(const struct frame *frame, const struct scene *scene, const 
 {
 	struct image_buffer buffer = {.data = (unsigned char *)1, .size = 1};
 	char error[256] = "";
-	assert_false(api->encode(frame, scene, &metadata, &buffer, error, sizeof error));
+	assert_false(api->encode(frame, scene, &metadata, NULL, &buffer, error, sizeof error));
 	assert_null(buffer.data);
 	if (!strstr(error, word))
 		fail_msg("\"%s\" does not say \"%s\"", error, word);
@@ -287,12 +287,63 @@ static int load(void **state)
 	return api ? 0 : -1;
 }
 
+struct rows_asked {
+	int left, asked;
+};
+
+static bool is_enough(void *context)
+{
+	struct rows_asked *rows = context;
+	rows->asked++;
+	return rows->left-- <= 0;
+}
+
+/* Whenever it is asked, writing ends with nothing; who goes on to the end gets the same bytes as who is not asked. */
+static void test_writing_stops(void **state)
+{
+	(void)state;
+	static float light[3 * 200 * 32];
+	static unsigned char codes[sizeof light / sizeof *light];
+	for (int form = 0; form < 3; form++) {
+		struct scene scene = sample_scene(form == 2 ? IMAGE_EXR : IMAGE_PNG);
+		scene.output.png_compression = form == 1 ? PNG_SMALL : PNG_FAST;
+		scene.output.width = 32;
+		scene.output.height = 200;
+		const struct frame frame = {.width = 32,
+					    .height = 200,
+					    .type = form == 2 ? PIXEL_F32 : PIXEL_U8,
+					    .channels = 3,
+					    .layer_count = 1,
+					    .layer = {LAYER_COLOR},
+					    .pixels = form == 2 ? (void *)light : codes,
+					    .bytes = form == 2 ? sizeof light : sizeof codes};
+		struct image_buffer whole = encode(&frame, &scene), buffer;
+		struct rows_asked rows = {.left = 1000};
+		const struct image_watch watch = {is_enough, &rows};
+		char error[256] = "";
+		assert_true(api->encode(&frame, &scene, &metadata, &watch, &buffer, error, sizeof error));
+		assert_int_equal(buffer.size, whole.size);
+		assert_memory_equal(buffer.data, whole.data, whole.size);
+		free(buffer.data);
+		free(whole.data);
+		const int asked = rows.asked;
+		assert_in_range(asked, 4, 8);
+		for (int at = 0; at < asked; at++) {
+			rows = (struct rows_asked){.left = at};
+			assert_false(api->encode(&frame, &scene, &metadata, &watch, &buffer, error, sizeof error));
+			assert_null(buffer.data);
+			assert_int_equal(rows.asked, at + 1);
+		}
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_module_loads_once), cmocka_unit_test(test_png_repeats),   cmocka_unit_test(test_exr_repeats),
 		cmocka_unit_test(test_exr_dark),          cmocka_unit_test(test_exr_panoramas), cmocka_unit_test(test_png_refusals),
 		cmocka_unit_test(test_exr_refusals),      cmocka_unit_test(test_size_refusals), cmocka_unit_test(test_threads_agree),
+		cmocka_unit_test(test_writing_stops),
 	};
 	return cmocka_run_group_tests(tests, load, NULL);
 }

@@ -275,24 +275,52 @@ static bool stop_after(void *context)
 	return countdown->left-- <= 0;
 }
 
+/* A scene of which nothing is remembered, from below or above. */
+static struct scene new_scene(double height)
+{
+	static int made;
+	struct scene scene = small_scene(32, 32, LAYER(COLOR) | LAYER(AIR));
+	made++;
+	scene.clouds.seed = 7700 + (unsigned)made;
+	scene.clouds.resolution = 256;
+	scene.sun.elevation_deg = 30 + 0.01 * made;
+	scene.atmosphere.aerosol_optical_depth = 0.1 + 1e-4 * made;
+	scene.camera.position_m[2] = height;
+	return scene;
+}
+
+/* Between the passes of sky, field and exchange, too: wherever it is asked. What is stopped leaves nothing behind that is taken for whole.
+ */
 static void cancelling_stops(void **state)
 {
 	(void)state;
 	struct frame frame;
-	struct scene scene = small_scene(32, 32, LAYER(COLOR) | LAYER(AIR));
-	scene.clouds.seed = 77; /* nothing remembered */
-	struct countdown never = {.left = 1000};
-	for (int at = 0; at < 6; at++) {
-		struct countdown countdown = {.left = at};
-		memset(&frame, 0xff, sizeof frame);
-		assert_int_equal(renderer_render(renderer, &scene, stop_after, &countdown, &frame), RENDER_CANCELLED);
-		assert_null(frame.pixels);
-		assert_int_equal(frame.bytes, 0);
-		assert_in_range(countdown.asked, at + 1, at + 2);
+	for (int from_above = 0; from_above < 2; from_above++) {
+		const double height = from_above ? 5000 : 2;
+		struct scene scene = new_scene(height);
+		struct countdown never = {.left = 1000};
+		assert_int_equal(renderer_render(renderer, &scene, stop_after, &never, &frame), RENDER_OK);
+		frame_finish(&frame);
+		assert_in_range(never.asked, 18, 100);
+		for (int at = 0; at < never.asked; at++) {
+			struct countdown countdown = {.left = at};
+			scene = new_scene(height);
+			memset(&frame, 0xff, sizeof frame);
+			assert_int_equal(renderer_render(renderer, &scene, stop_after, &countdown, &frame), RENDER_CANCELLED);
+			assert_null(frame.pixels);
+			assert_int_equal(frame.bytes, 0);
+			assert_in_range(countdown.asked, at + 1, at + 2);
+		}
 	}
-	assert_int_equal(renderer_render(renderer, &scene, stop_after, &never, &frame), RENDER_OK);
-	assert_in_range(never.asked, 6, 20);
-	/* What a stop left behind spoils nothing. */
+	/* Always the same scene: what was done in vain is gone or whole. */
+	struct scene scene = new_scene(2);
+	for (int at = 0; at < 18; at++) {
+		struct countdown countdown = {.left = at};
+		if (renderer_render(renderer, &scene, stop_after, &countdown, &frame) == RENDER_OK)
+			frame_finish(&frame);
+	}
+	struct countdown last = {.left = 1000};
+	assert_int_equal(renderer_render(renderer, &scene, stop_after, &last, &frame), RENDER_OK);
 	struct frame clean = render(&scene);
 	assert_same_bytes(&clean, &frame);
 	frame_finish(&clean);

@@ -81,11 +81,11 @@ static void test_sweep(void **state)
 		assert_true(worker_pool_try(pool, &first.work));
 		await(&first.started);
 		for (unsigned i = 0; i < 4; i++) {
-			tasks[i].work.run = run;
+			tasks[i].work = (struct work){.run = run, .is_over = is_over};
 			tasks[i].over = over >> i & 1;
 			assert_true(worker_pool_try(pool, &tasks[i].work));
 		}
-		worker_pool_sweep(pool, is_over);
+		worker_pool_sweep(pool);
 		for (unsigned i = 0; i < 4; i++)
 			assert_int_equal(tasks[i].done, over >> i & 1);
 		assert_int_equal(worker_pool_waiting(pool), 4 - __builtin_popcount(over));

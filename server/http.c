@@ -35,10 +35,23 @@ static size_t body_max(const struct request *request)
 	return (size_t)request->service->config->body_max_kb << 10;
 }
 
+/* libmicrohttpd would make a list of the query's members, which nobody reads, in the memory of the connection; some thousands of them use
+ * that up. */
+static void hide_query(const char *target)
+{
+	char *query = strchr(target, '?');
+	if (query && query[1])
+		query[1] = '\0';
+}
+
 static void *on_target(void *context, const char *target, struct MHD_Connection *connection)
 {
 	const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
-	return request_create(context, info ? info->socket_context : NULL, target);
+	struct connection *socket = info ? info->socket_context : NULL;
+	struct request *request = request_create(context, socket, target);
+	connection_set_request(socket, request);
+	hide_query(target);
+	return request;
 }
 
 static enum MHD_Result on_accept(void *context, const struct sockaddr *address, socklen_t size)
@@ -71,6 +84,12 @@ static bool allows(const struct route *route, const char *method)
 		c += word;
 	}
 	return false;
+}
+
+static bool has_body(const struct request *request)
+{
+	const char *length = request_header(request, "Content-Length");
+	return (length && strtoull(length, NULL, 10) > 0) || request_header(request, "Transfer-Encoding");
 }
 
 static bool is_encoded(const struct request *request)
@@ -109,7 +128,7 @@ static enum MHD_Result refuse_connection(struct request *request)
 }
 
 /* The headers are in: what is wrong already is answered before a body is read. */
-static enum MHD_Result begin(struct request *request, const char *method)
+static enum MHD_Result begin(struct request *request, const char *method, const char *version)
 {
 	request_identify(request);
 	request->is_post = strcmp(method, MHD_HTTP_METHOD_POST) == 0;
@@ -119,7 +138,7 @@ static enum MHD_Result begin(struct request *request, const char *method)
 	request->route = routes_find(request->path);
 	request->next = request->route->handler;
 	connection_expect_body(request->socket);
-	const char *fault = framing_fault(request->connection);
+	const char *fault = framing_fault(request->connection, version);
 	if (fault) {
 		request->closes = true;
 		return response_send_new_problem(request, PROBLEM_BAD_REQUEST, "%s", fault);
@@ -165,12 +184,13 @@ static enum MHD_Result on_access(void *context, struct MHD_Connection *connectio
 				 const char *data, size_t *size, void **state)
 {
 	struct request *request = *state;
-	(void)context, (void)url, (void)version;
+	(void)context, (void)url;
 	if (!request)
 		return MHD_NO;
 	if (!request->connection) {
 		request->connection = connection;
-		return begin(request, method);
+		/* An answer to this first call ends the connection, which without a body nothing asks for. */
+		return has_body(request) ? begin(request, method, version) : MHD_YES;
 	}
 	if (*size) {
 		enum MHD_Result result = take_body(request, data, *size);
@@ -182,6 +202,11 @@ static enum MHD_Result on_access(void *context, struct MHD_Connection *connectio
 	if (!request->is_accepted)
 		request->service->in_flight++;
 	request->is_accepted = true;
+	if (!*request->method) {
+		const enum MHD_Result result = begin(request, method, version);
+		if (result != MHD_YES || request->status)
+			return result;
+	}
 	return request->next(request);
 }
 
@@ -206,6 +231,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	if (request->is_accepted)
 		service->in_flight--;
 	connection_end(request->socket);
+	connection_set_request(request->socket, NULL);
 	request_destroy(request);
 	*state = NULL;
 }

@@ -225,6 +225,19 @@ struct connections_counts connections_count(struct connections *connections)
 	return counts;
 }
 
+size_t connections_total(const struct connections *connections)
+{
+	return connections->params.total;
+}
+
+void connections_lower(struct connections *connections, size_t total)
+{
+	pthread_mutex_lock(&connections->mutex);
+	if (total < connections->params.total)
+		connections->params.total = total;
+	pthread_mutex_unlock(&connections->mutex);
+}
+
 /* --- of whom ---------------------------------------------------------------------------------------------------------------------- */
 
 static struct address *find_address(const struct connections *connections, const char *key)

@@ -52,6 +52,10 @@ void connections_destroy(struct connections *connections);
 
 struct connections_counts connections_count(struct connections *connections);
 
+/* Those that are served; lowered to what descriptors there are, before the first one comes. */
+size_t connections_total(const struct connections *connections);
+void connections_lower(struct connections *connections, size_t total);
+
 /* --- called by the HTTP threads --------------------------------------------------------------------------------------------------- */
 
 /* May a connection from there be made at all? */

@@ -22,7 +22,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { IDLE_SECONDS = 30, HTTP_THREADS = 2, DESCRIPTORS_BESIDE = 256 };
+enum { IDLE_SECONDS = 30, HTTP_THREADS = 2 };
+
+/* A connection may have a file on its way; besides there are uploads, libraries, and what lingers. */
+enum { DESCRIPTORS_EACH = 2, DESCRIPTORS_BESIDE = 256 };
 
 /* Request line and headers of one connection, and those of its answer, share this much: enough to read what is too large, and say so. */
 static size_t connection_memory(const struct config *config)
@@ -123,8 +126,8 @@ static enum MHD_Result refuse_connection(struct request *request)
 	metrics_count_rejection(request->service->metrics, REJECTED_CONNECTIONS);
 	return response_send_new_problem(
 		request, PROBLEM_CONNECTIONS,
-		"At most %d connections at a time (--connections), %d of each address (--connections-per-address).", config->connections,
-		config->connections_per_address);
+		"At most %zu connections at a time (--connections), %d of each address (--connections-per-address).",
+		connections_total(request->service->connections), config->connections_per_address);
 }
 
 /* The headers are in: what is wrong already is answered before a body is read. */
@@ -353,22 +356,34 @@ static struct MHD_Daemon *start_daemon(struct service *service, const struct add
 				MHD_OPTION_END);
 }
 
-/* A process is often given fewer descriptors than it may have. */
-static void raise_descriptors(const struct config *config)
+/* A process is often given fewer descriptors than it may have. Where it may not have enough either, fewer connections are served: without a
+ * descriptor to spare not even probes could be answered. */
+static bool fit_descriptors(struct service *service)
 {
 	struct rlimit limit;
-	const rlim_t wanted = (rlim_t)config->connections + CONNECTIONS_SURPLUS + DESCRIPTORS_BESIDE;
+	const rlim_t beside = CONNECTIONS_SURPLUS + DESCRIPTORS_BESIDE;
+	const rlim_t wanted = (rlim_t)service->config->connections * DESCRIPTORS_EACH + beside;
 	if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted)
-		return;
+		return true;
 	limit.rlim_cur = limit.rlim_max < wanted ? limit.rlim_max : wanted;
-	if (setrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur < wanted)
-		log_warning("--connections %d: the process may open %llu files only", config->connections,
-			    (unsigned long long)limit.rlim_cur);
+	if (setrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur >= wanted)
+		return true;
+	const unsigned long long files = getrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur : 0;
+	if (files < beside + DESCRIPTORS_EACH) {
+		log_error("the process may open %llu files only, and needs %llu at least (ulimit -n)", files,
+			  (unsigned long long)beside + DESCRIPTORS_EACH);
+		return false;
+	}
+	connections_lower(service->connections, (files - beside) / DESCRIPTORS_EACH);
+	log_warning("--connections %d: the process may open %llu files only, so %zu connections are served", service->config->connections,
+		    files, connections_total(service->connections));
+	return true;
 }
 
 bool http_start(struct service *service)
 {
-	raise_descriptors(service->config);
+	if (!fit_descriptors(service))
+		return false;
 	char host[sizeof service->host - 2];
 	struct addrinfo *address = resolve(service->config->listen, host, sizeof host, false);
 	if (!address)

@@ -37,7 +37,8 @@ static void state_problem(struct problem *problem, unsigned status, bool in_body
 		problem_set(problem, PROBLEM_TOO_LARGE, "The length of %s is beyond all numbers.", in_body ? "a chunk" : "the body");
 		return;
 	case MHD_HTTP_URI_TOO_LONG:
-		problem_set(problem, PROBLEM_TARGET, "The address is longer than all of a request may be before its body (--header-max-kb).");
+		problem_set(problem, PROBLEM_TARGET,
+			    "The address is longer than all of a request may be before its body (--header-max-kb).");
 		return;
 	case MHD_HTTP_REQUEST_HEADER_FIELDS_TOO_LARGE:
 		problem_set(problem, PROBLEM_HEADERS, "Request line and headers are too long, or too many (--header-max-kb).");
@@ -50,9 +51,10 @@ static void state_problem(struct problem *problem, unsigned status, bool in_body
 			problem_set(problem, PROBLEM_INTERNAL, "Out of memory.");
 		break;
 	}
-	problem_set(problem, PROBLEM_BAD_REQUEST,
-		    in_body ? "The body's chunks are malformed: each is its length in hexadecimal, a line's end, so many bytes, and another."
-			    : "The request line is malformed, or a header, or Content-Length is no whole number.");
+	problem_set(
+		problem, PROBLEM_BAD_REQUEST,
+		in_body ? "The body's chunks are malformed: each is its length in hexadecimal, a line's end, so many bytes, and another."
+			: "The request line is malformed, or a header, or Content-Length is no whole number.");
 }
 
 static void refuse(struct MHD_Connection *connection, struct connection *socket, unsigned status)
@@ -71,8 +73,8 @@ static void refuse(struct MHD_Connection *connection, struct connection *socket,
 	response_send_problem_past(request);
 }
 
-/* Called by the library alone, which goes on afterwards as it is used to, since it may be anywhere in a request: it finds out that it cannot
- * send, and closes the connection. */
+/* Called by the library alone, which goes on afterwards as it is used to, since it may be anywhere in a request: it finds out that it
+ * cannot send, and closes the connection. */
 enum MHD_Result MHD_queue_response(struct MHD_Connection *connection, unsigned status, struct MHD_Response *response)
 {
 	const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);

@@ -8,13 +8,14 @@ import time
 
 import pytest
 
-from conftest import SANITIZED, Daemon, wait_for
+from conftest import ROOT, SANITIZED, Daemon, wait_for
 from test_access import bearer, make_certificate, new_key
 from test_contract import PNG
 from test_limits import HOST, POST, ask, connect, problem_of, read_all, status_of
 
 # What would tell a stranger how the daemon is made.
 INSIDES = re.compile(rb"libmicrohttpd|MHD|jansson|JSON_[A-Z]|\.[ch]:\d|/work|/tmp|/usr|0x[0-9a-f]{6}|html", re.I)
+PICTURES = ROOT / "tests" / "fuzz" / "seeds" / "picture"
 LARGE = 24 << 20  # more than the sockets of both ends hold
 
 
@@ -229,6 +230,31 @@ def test_refusals_leave_the_connection(daemon):
         answer.read()
         assert answer.status == status and connection.sock is socket, (method, path)
     connection.close()
+
+
+BROKEN = {
+    "png cut": (PICTURES / "rgb-8.png", slice(0, -20), None),
+    "png without its end": (PICTURES / "rgba-16.png", slice(0, 300), None),
+    "png of another checksum": (PICTURES / "grey-8.png", slice(None), (-20, 0x41)),
+    "png of another header": (PICTURES / "grey-8.png", slice(None), (31, 0x41)),
+    "exr cut": (PICTURES / "zip.exr", slice(0, -100), None),
+    "exr of another order": (PICTURES / "b44.exr", slice(None), (b"lineOrder\0lineOrder\0\1\0\0\0", 9)),
+}
+
+
+@pytest.mark.parametrize("path, part, change", BROKEN.values(), ids=BROKEN.keys())
+def test_what_is_wrong_with_a_picture(daemon, path, part, change):
+    """In words about the picture, not about the libraries that read it."""
+    data = bytearray(path.read_bytes()[part])
+    if change:
+        where, value = change
+        at = where if isinstance(where, int) else data.index(where) + len(where)
+        data[at] = value if data[at] != value else value ^ 1
+    answer = daemon.request("PUT", "/v1/assets/broken", bytes(data))
+    detail = answer.json["detail"]
+    assert answer.status == 422 and answer.json["type"] == "urn:stratus:problem:invalid-asset", detail
+    assert detail.startswith("The picture ") and detail.endswith(".") and not detail.endswith("..") and len(detail) > 20
+    assert not re.search(r"picture\.exr|exception|library|read error|[\n\"]picture", detail, re.I), detail
 
 
 # --- how long it takes ----------------------------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 #!/bin/bash
 # Runs every test against the programs in BUILD_DIR: test.sh BUILD_DIR. The last line is "N passed, N failed".
-# After the plain build the tests of programs are repeated with sanitizers; STRATUS_QUICK=1 leaves that out.
+# After the plain build the tests of programs are repeated with sanitizers, and those of what threads share with that for threads;
+# STRATUS_QUICK=1 leaves that out.
 # What fails beside others is run once more at the end, alone, and counts by that; it is named as "unsteady: NAME" before the last line.
 set -uo pipefail
 B=${1:-build}
@@ -21,7 +22,7 @@ count() { # count PASSED FAILED
 run_unit() {
 	local program=$1 output status ok bad
 	echo "== ${program#"$B"/}"
-	output=$(timeout 1500 "$@" 2>&1)
+	output=$(timeout 1500 "${calm[@]}" "$@" 2>&1)
 	status=$?
 	if [ $status = 77 ]; then
 		echo "skipped"
@@ -46,6 +47,9 @@ run_unit() {
 # What measures light for minutes runs code that others run as well: left out with sanitizers, under which it takes longer still, to build too.
 measures=" deck reference_layer reference_twin renderer_coverage renderer_fields renderer_model renderer_motion renderer_panoramas renderer_repeat
 	renderer_sides shaders_picture sky_light slab slab_photons "
+
+# ThreadSanitizer of gcc 12 knows where memory is as long as the kernel does not scatter it too far (vm.mmap_rnd_bits).
+calm=()
 
 run_units() {
 	local program name
@@ -140,6 +144,25 @@ run_sanitized() {
 	count ${counts:-0 1}
 }
 
+# What threads share, with the sanitizer that sees a lock missing.
+run_threads() {
+	local log=$results/threads name is_alone=1 programs=()
+	for name in render_queue fair_order flight image_cache intake worker_pool cache api_keys asset_store cost_model lingering log; do
+		programs+=("build/san-thread/tests/test_$name")
+	done
+	echo "== again with SAN=thread"
+	if ! make --no-print-directory -j"$(nproc)" SAN=thread "${programs[@]}" >"$log" 2>&1; then
+		cat "$log"
+		count 0 1
+		return
+	fi
+	setarch -R true 2>/dev/null && calm=(setarch -R)
+	for name in "${programs[@]}"; do
+		run_unit "$name"
+	done
+	calm=()
+}
+
 # Leaks of drivers are told from ours by the module that allocated, so that no module may be unloaded before the report.
 keep_modules() {
 	echo 'int dlclose(void *handle) { (void)handle; return 0; }' | gcc -shared -fPIC -x c - -o "$results/keep.so" || return
@@ -181,7 +204,10 @@ cat "$results/programs.log"
 count $(cat "$results/programs" || echo 0 1)
 run_again
 [ -n "$SAN" ] || run_web
-[ -z "$sanitized" ] || run_sanitized
+if [ -n "$sanitized" ]; then
+	run_sanitized
+	run_threads
+fi
 
 cat "$results/unsteady.again"
 echo "$passed passed, $failed failed"

@@ -6,6 +6,7 @@
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* --- one pixel -------------------------------------------------------------------------------------------------------------------- */
 
@@ -99,6 +100,23 @@ static bool examine_rows(void *context, const struct image_rows *rows)
 	return examination->finite;
 }
 
+/* Of a library's words those about the picture: behind who says so and of which file, before a second line and the last full stop. */
+static const char *matter_of(char *reason)
+{
+	static const char *const speakers[] = {
+		"PNG read error: ", "OpenEXR exception: ", "Failed OpenEXR read: ", "image file \"picture.exr\". "};
+	const char *matter = reason;
+	reason[strcspn(reason, "\n")] = '\0';
+	for (size_t i = strlen(reason); i > 0 && strchr(". ", reason[i - 1]); i--)
+		reason[i - 1] = '\0';
+	for (size_t i = 0; i < sizeof speakers / sizeof *speakers; i++) {
+		const char *speaker = strstr(matter, speakers[i]);
+		if (speaker)
+			matter = speaker + strlen(speakers[i]);
+	}
+	return matter;
+}
+
 bool asset_examine(const struct image_api *images, int fd, uint64_t size, struct asset_facts *facts, char *error, size_t error_size)
 {
 	struct picture_file file;
@@ -116,7 +134,7 @@ bool asset_examine(const struct image_api *images, int fd, uint64_t size, struct
 	if (!examination.finite)
 		snprintf(error, error_size, "holds a value that is not finite");
 	else if (!ok)
-		snprintf(error, error_size, "cannot be read: %s", reason);
+		snprintf(error, error_size, "cannot be read: %s", matter_of(reason));
 	for (int band = 0; band < 3; band++)
 		facts->mean_albedo[band] = (float)(examination.sum[band] / ((double)file.width * file.height));
 end:

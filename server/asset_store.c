@@ -28,7 +28,8 @@ struct asset_upload {
 	struct asset_store *store;
 	char name[SCENE_NAME_MAX], temporary[PATH_MAX];
 	int fd;
-	uint64_t bytes, room; /* that came; that all uploads may take */
+	uint64_t bytes, room;     /* that came; that all uploads may take */
+	enum asset_result spoilt; /* what became of writing it, when that failed once */
 	struct digest digest;
 };
 
@@ -342,8 +343,10 @@ enum asset_result asset_upload_append(struct asset_upload *upload, const void *b
 	pthread_mutex_unlock(&store->mutex);
 	if (!fits)
 		return ASSET_FULL;
+	if (upload->spoilt == ASSET_OK && !file_write_all(upload->fd, bytes, size))
+		upload->spoilt = failure("cannot be written", upload->temporary);
 	digest_add(&upload->digest, bytes, size);
-	return file_write_all(upload->fd, bytes, size) ? ASSET_OK : failure("cannot be written", upload->temporary);
+	return upload->spoilt;
 }
 
 int asset_upload_fd(const struct asset_upload *upload, uint64_t *size)

@@ -2,6 +2,7 @@
 
 #include "renderer/log.h"
 #include "server/clock.h"
+#include "server/lingering.h"
 
 #include <errno.h>
 #include <linux/tcp.h>
@@ -37,10 +38,11 @@ struct connection {
 	int fd;
 	enum phase phase;
 	bool is_surplus;
+	struct request *request;
 	double begun_ms, limit_ms, body_ms; /* first byte of the request; its end at the latest; the end of its headers */
 	size_t received;
 	uint64_t bytes_before; /* that had come when the last request ended */
-	_Atomic bool is_gone, is_slow;
+	_Atomic bool is_gone, is_slow, lingers;
 };
 
 struct connections {
@@ -49,6 +51,7 @@ struct connections {
 	struct connection *first;
 	struct address *addresses;
 	struct connections_counts counts;
+	struct lingering *lingering;
 	uint64_t last_id;
 	int epoll, wake;
 	bool has_thread;
@@ -67,6 +70,8 @@ static void refuse_slowness(const struct connection *connection)
 	static const char head[] = "HTTP/1.1 408 Request Timeout\r\nContent-Type: application/problem+json\r\nCache-Control: no-store\r\n"
 				   "Connection: close\r\nContent-Length: ";
 	char answer[sizeof head + sizeof body + 32];
+	if (connection->lingers || connection->owner->params.is_encrypted)
+		return; /* answered before; or a TLS session, in which this thread has no part */
 	const int length = snprintf(answer, sizeof answer, "%s%zu\r\n\r\n%s", head, sizeof body - 1, body);
 	if (send(connection->fd, answer, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) < 0)
 		log_debug("a slow client could not be answered");
@@ -146,6 +151,7 @@ static void *watch(void *context)
 		if (late)
 			close_slow(connections);
 		pthread_mutex_unlock(&connections->mutex);
+		lingering_work(connections->lingering);
 		if (!late && !gone)
 			continue;
 		last_tick_ms = clock_now_ms();
@@ -155,6 +161,13 @@ static void *watch(void *context)
 }
 
 /* --- life ------------------------------------------------------------------------------------------------------------------------- */
+
+/* By events that are of no connection. */
+static bool wakes_by(const struct connections *connections, int fd)
+{
+	struct epoll_event event = {.events = EPOLLIN};
+	return epoll_ctl(connections->epoll, EPOLL_CTL_ADD, fd, &event) == 0;
+}
 
 struct connections *connections_create(const struct connections_params *params)
 {
@@ -167,9 +180,9 @@ struct connections *connections_create(const struct connections_params *params)
 	pthread_mutex_init(&connections->mutex, NULL);
 	connections->epoll = epoll_create1(EPOLL_CLOEXEC);
 	connections->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-	struct epoll_event event = {.events = EPOLLIN};
-	if (connections->epoll >= 0 && connections->wake >= 0 &&
-	    epoll_ctl(connections->epoll, EPOLL_CTL_ADD, connections->wake, &event) == 0)
+	connections->lingering = lingering_create();
+	if (connections->epoll >= 0 && connections->wake >= 0 && connections->lingering && wakes_by(connections, connections->wake) &&
+	    wakes_by(connections, lingering_fd(connections->lingering)))
 		connections->has_thread = pthread_create(&connections->thread, NULL, watch, connections) == 0;
 	if (connections->has_thread)
 		return connections;
@@ -195,6 +208,7 @@ void connections_destroy(struct connections *connections)
 	if (!connections)
 		return;
 	connections_stop(connections);
+	lingering_destroy(connections->lingering);
 	if (connections->epoll >= 0)
 		close(connections->epoll);
 	if (connections->wake >= 0)
@@ -209,6 +223,19 @@ struct connections_counts connections_count(struct connections *connections)
 	const struct connections_counts counts = connections->counts;
 	pthread_mutex_unlock(&connections->mutex);
 	return counts;
+}
+
+size_t connections_total(const struct connections *connections)
+{
+	return connections->params.total;
+}
+
+void connections_lower(struct connections *connections, size_t total)
+{
+	pthread_mutex_lock(&connections->mutex);
+	if (total < connections->params.total)
+		connections->params.total = total;
+	pthread_mutex_unlock(&connections->mutex);
 }
 
 /* --- of whom ---------------------------------------------------------------------------------------------------------------------- */
@@ -309,6 +336,8 @@ void connection_close(struct connection *connection)
 	struct connections *connections = connection->owner;
 	pthread_mutex_lock(&connections->mutex);
 	epoll_ctl(connections->epoll, EPOLL_CTL_DEL, connection->fd, NULL);
+	if (connection->lingers)
+		lingering_take(connections->lingering, connection->fd);
 	*connection->link = connection->next;
 	if (connection->next)
 		connection->next->link = connection->link;
@@ -387,6 +416,23 @@ void connection_watch(struct connection *connection)
 void connection_end(struct connection *connection)
 {
 	set_phase(connection, PHASE_IDLE);
+}
+
+void connection_linger(struct connection *connection)
+{
+	if (connection)
+		connection->lingers = true;
+}
+
+void connection_set_request(struct connection *connection, struct request *request)
+{
+	if (connection)
+		connection->request = request;
+}
+
+struct request *connection_request(const struct connection *connection)
+{
+	return connection ? connection->request : NULL;
 }
 
 const char *connection_client(const struct connection *connection)

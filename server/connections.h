@@ -27,10 +27,12 @@ enum { CONNECTIONS_SURPLUS = 64, CONNECTIONS_SURPLUS_PER_ADDRESS = 8 };
 
 struct connections;
 struct connection;
+struct request;
 
 struct connections_params {
 	size_t total, per_address; /* from 1 */
 	double read_ms;            /* for the headers of a request, and for its body beyond what CONNECTION_BODY_RATE allows */
+	bool is_encrypted;         /* by TLS */
 	/* Clients have gone, or some time has passed: called again and again by the watching thread. */
 	void (*tick)(void *context);
 	void *context;
@@ -49,6 +51,10 @@ void connections_stop(struct connections *connections);
 void connections_destroy(struct connections *connections);
 
 struct connections_counts connections_count(struct connections *connections);
+
+/* Those that are served; lowered to what descriptors there are, before the first one comes. */
+size_t connections_total(const struct connections *connections);
+void connections_lower(struct connections *connections, size_t total);
 
 /* --- called by the HTTP threads --------------------------------------------------------------------------------------------------- */
 
@@ -71,6 +77,12 @@ void connection_work(struct connection *connection);
 void connection_watch(struct connection *connection);
 /* It was answered; another may follow. */
 void connection_end(struct connection *connection);
+/* It was answered before its end: what is left of it is still read when the connection closes (lingering.h). */
+void connection_linger(struct connection *connection);
+
+/* What is asked on it now, for whoever has the connection alone. NULL: nothing, or nothing that could be read. */
+void connection_set_request(struct connection *connection, struct request *request);
+struct request *connection_request(const struct connection *connection);
 
 /* Of the client, for as long as the connection is open. "local" for NULL. */
 const char *connection_client(const struct connection *connection);

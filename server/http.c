@@ -22,7 +22,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { IDLE_SECONDS = 30, HTTP_THREADS = 2, DESCRIPTORS_BESIDE = 256 };
+enum { IDLE_SECONDS = 30, HTTP_THREADS = 2 };
+
+/* A connection may have a file on its way; besides there are uploads, libraries, and what lingers. */
+enum { DESCRIPTORS_EACH = 2, DESCRIPTORS_BESIDE = 256 };
 
 /* Request line and headers of one connection, and those of its answer, share this much: enough to read what is too large, and say so. */
 static size_t connection_memory(const struct config *config)
@@ -35,10 +38,23 @@ static size_t body_max(const struct request *request)
 	return (size_t)request->service->config->body_max_kb << 10;
 }
 
+/* libmicrohttpd would make a list of the query's members, which nobody reads, in the memory of the connection; some thousands of them use
+ * that up. */
+static void hide_query(const char *target)
+{
+	char *query = strchr(target, '?');
+	if (query && query[1])
+		query[1] = '\0';
+}
+
 static void *on_target(void *context, const char *target, struct MHD_Connection *connection)
 {
 	const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
-	return request_create(context, info ? info->socket_context : NULL, target);
+	struct connection *socket = info ? info->socket_context : NULL;
+	struct request *request = request_create(context, socket, target);
+	connection_set_request(socket, request);
+	hide_query(target);
+	return request;
 }
 
 static enum MHD_Result on_accept(void *context, const struct sockaddr *address, socklen_t size)
@@ -73,6 +89,12 @@ static bool allows(const struct route *route, const char *method)
 	return false;
 }
 
+static bool has_body(const struct request *request)
+{
+	const char *length = request_header(request, "Content-Length");
+	return (length && strtoull(length, NULL, 10) > 0) || request_header(request, "Transfer-Encoding");
+}
+
 static bool is_encoded(const struct request *request)
 {
 	const char *encoding = request_header(request, "Content-Encoding");
@@ -104,12 +126,12 @@ static enum MHD_Result refuse_connection(struct request *request)
 	metrics_count_rejection(request->service->metrics, REJECTED_CONNECTIONS);
 	return response_send_new_problem(
 		request, PROBLEM_CONNECTIONS,
-		"At most %d connections at a time (--connections), %d of each address (--connections-per-address).", config->connections,
-		config->connections_per_address);
+		"At most %zu connections at a time (--connections), %d of each address (--connections-per-address).",
+		connections_total(request->service->connections), config->connections_per_address);
 }
 
 /* The headers are in: what is wrong already is answered before a body is read. */
-static enum MHD_Result begin(struct request *request, const char *method)
+static enum MHD_Result begin(struct request *request, const char *method, const char *version)
 {
 	request_identify(request);
 	request->is_post = strcmp(method, MHD_HTTP_METHOD_POST) == 0;
@@ -119,7 +141,7 @@ static enum MHD_Result begin(struct request *request, const char *method)
 	request->route = routes_find(request->path);
 	request->next = request->route->handler;
 	connection_expect_body(request->socket);
-	const char *fault = framing_fault(request->connection);
+	const char *fault = framing_fault(request->connection, version);
 	if (fault) {
 		request->closes = true;
 		return response_send_new_problem(request, PROBLEM_BAD_REQUEST, "%s", fault);
@@ -165,12 +187,13 @@ static enum MHD_Result on_access(void *context, struct MHD_Connection *connectio
 				 const char *data, size_t *size, void **state)
 {
 	struct request *request = *state;
-	(void)context, (void)url, (void)version;
+	(void)context, (void)url;
 	if (!request)
 		return MHD_NO;
 	if (!request->connection) {
 		request->connection = connection;
-		return begin(request, method);
+		/* An answer to this first call ends the connection, which without a body nothing asks for. */
+		return has_body(request) ? begin(request, method, version) : MHD_YES;
 	}
 	if (*size) {
 		enum MHD_Result result = take_body(request, data, *size);
@@ -182,6 +205,11 @@ static enum MHD_Result on_access(void *context, struct MHD_Connection *connectio
 	if (!request->is_accepted)
 		request->service->in_flight++;
 	request->is_accepted = true;
+	if (!*request->method) {
+		const enum MHD_Result result = begin(request, method, version);
+		if (result != MHD_YES || request->status)
+			return result;
+	}
 	return request->next(request);
 }
 
@@ -206,6 +234,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	if (request->is_accepted)
 		service->in_flight--;
 	connection_end(request->socket);
+	connection_set_request(request->socket, NULL);
 	request_destroy(request);
 	*state = NULL;
 }
@@ -327,22 +356,34 @@ static struct MHD_Daemon *start_daemon(struct service *service, const struct add
 				MHD_OPTION_END);
 }
 
-/* A process is often given fewer descriptors than it may have. */
-static void raise_descriptors(const struct config *config)
+/* A process is often given fewer descriptors than it may have. Where it may not have enough either, fewer connections are served: without a
+ * descriptor to spare not even probes could be answered. */
+static bool fit_descriptors(struct service *service)
 {
 	struct rlimit limit;
-	const rlim_t wanted = (rlim_t)config->connections + CONNECTIONS_SURPLUS + DESCRIPTORS_BESIDE;
+	const rlim_t beside = CONNECTIONS_SURPLUS + DESCRIPTORS_BESIDE;
+	const rlim_t wanted = (rlim_t)service->config->connections * DESCRIPTORS_EACH + beside;
 	if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted)
-		return;
+		return true;
 	limit.rlim_cur = limit.rlim_max < wanted ? limit.rlim_max : wanted;
-	if (setrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur < wanted)
-		log_warning("--connections %d: the process may open %llu files only", config->connections,
-			    (unsigned long long)limit.rlim_cur);
+	if (setrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur >= wanted)
+		return true;
+	const unsigned long long files = getrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur : 0;
+	if (files < beside + DESCRIPTORS_EACH) {
+		log_error("the process may open %llu files only, and needs %llu at least (ulimit -n)", files,
+			  (unsigned long long)beside + DESCRIPTORS_EACH);
+		return false;
+	}
+	connections_lower(service->connections, (files - beside) / DESCRIPTORS_EACH);
+	log_warning("--connections %d: the process may open %llu files only, so %zu connections are served", service->config->connections,
+		    files, connections_total(service->connections));
+	return true;
 }
 
 bool http_start(struct service *service)
 {
-	raise_descriptors(service->config);
+	if (!fit_descriptors(service))
+		return false;
 	char host[sizeof service->host - 2];
 	struct addrinfo *address = resolve(service->config->listen, host, sizeof host, false);
 	if (!address)

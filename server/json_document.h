@@ -8,8 +8,12 @@
 
 #include <jansson.h>
 
+/* Members and elements in all; a scene has a hundred, a comparison a hundred for each variant. */
+enum { JSON_DOCUMENT_VALUES_MAX = 16384 };
+
 /* Parses text[0..length), which must be followed by a NUL and may be changed. Whole numbers become reals. NULL when it is not JSON (the
- * problem is then PROBLEM_NOT_JSON with line and column). A tree comes back even when errors were added to the problem. */
+ * problem is then PROBLEM_NOT_JSON with line and column), or too much to be looked at (PROBLEM_INVALID). A tree comes back even when errors
+ * were added to the problem. */
 json_t *json_document_parse(char *text, size_t length, struct problem *problem);
 
 #endif

@@ -27,8 +27,8 @@ static const char *const source_names[DROPLET_SOURCE_COUNT] = {
 	[DROPLETS_FROM_MEMORY] = "memory", [DROPLETS_FROM_DISK] = "disk", [DROPLETS_COMPUTED] = "computed"};
 
 /* Every status that is sent; the last stands for all others. */
-static const unsigned statuses[] = {200, 201, 204, 304, 400, 401, 404, 405, 406, 408, 412,
-				    413, 415, 422, 429, 431, 499, 500, 503, 504, 507, 0};
+static const unsigned statuses[] = {200, 201, 204, 304, 400, 401, 404, 405, 406, 408, 412, 413,
+				    414, 415, 422, 429, 431, 499, 500, 503, 504, 505, 507, 0};
 enum { STATUS_COUNT = sizeof statuses / sizeof *statuses };
 
 enum { BOUND_COUNT = 16 };

@@ -27,6 +27,7 @@ static const struct kind kinds[PROBLEM_KIND_COUNT] = {
 	[PROBLEM_PRECONDITION] = {412, "precondition-failed", "The condition does not hold"},
 	[PROBLEM_READ_TIMEOUT] = {408, "request-timeout", "The request came too slowly"},
 	[PROBLEM_TOO_LARGE] = {413, "body-too-large", "The body is too large"},
+	[PROBLEM_TARGET] = {414, "uri-too-long", "The address is too long"},
 	[PROBLEM_MEDIA_TYPE] = {415, "unsupported-media-type", "Unsupported media type"},
 	[PROBLEM_INVALID] = {422, "invalid-scene", "Invalid parameters"},
 	[PROBLEM_BAD_ASSET] = {422, "invalid-asset", "The picture cannot be used"},
@@ -46,6 +47,7 @@ static const struct kind kinds[PROBLEM_KIND_COUNT] = {
 	[PROBLEM_UPLOADS_FULL] = {503, "queue-full", "Too much to do"},
 	[PROBLEM_UNAVAILABLE] = {503, "renderer-unavailable", "No renderer for now"},
 	[PROBLEM_DEADLINE] = {504, "deadline-passed", "The deadline passed"},
+	[PROBLEM_VERSION] = {505, "http-version-not-supported", "Another version of HTTP"},
 	[PROBLEM_STORAGE_FULL] = {507, "storage-full", "No room for this asset"},
 };
 
@@ -147,9 +149,12 @@ char *problem_to_json(const struct problem *problem, const char *request_id, uns
 	const struct kind *kind = &kinds[problem->kind];
 	char detail[PROBLEM_DETAIL_SIZE];
 	describe(problem, detail, sizeof detail);
-	json_t *root =
-		json_pack("{s:s+, s:s, s:i, s:s, s:s+, s:s}", "type", "urn:stratus:problem:", kind->name, "title", kind->title, "status",
-			  (int)kind->status, "detail", detail, "instance", "urn:stratus:request:", request_id, "request_id", request_id);
+	json_t *root = json_pack("{s:s+, s:s, s:i, s:s}", "type", "urn:stratus:problem:", kind->name, "title", kind->title, "status",
+				 (int)kind->status, "detail", detail);
+	if (root && request_id) {
+		json_object_set_new(root, "instance", json_pack("s+", "urn:stratus:request:", request_id));
+		json_object_set_new(root, "request_id", json_string(request_id));
+	}
 	if (root && problem->error_count)
 		json_object_set_new(root, "errors", errors_to_json(problem));
 	if (root && retry_after_seconds)

@@ -20,6 +20,7 @@ enum problem_kind {
 	PROBLEM_PRECONDITION,   /* 412 */
 	PROBLEM_READ_TIMEOUT,   /* 408, of what was read so far */
 	PROBLEM_TOO_LARGE,      /* 413 */
+	PROBLEM_TARGET,         /* 414 */
 	PROBLEM_MEDIA_TYPE,     /* 415 */
 	PROBLEM_INVALID,        /* 422, with `errors` */
 	PROBLEM_BAD_ASSET,      /* 422 */
@@ -39,6 +40,7 @@ enum problem_kind {
 	PROBLEM_UPLOADS_FULL,   /* 503 */
 	PROBLEM_UNAVAILABLE,    /* 503 */
 	PROBLEM_DEADLINE,       /* 504 */
+	PROBLEM_VERSION,        /* 505 */
 	PROBLEM_STORAGE_FULL,   /* 507 */
 	PROBLEM_KIND_COUNT
 };
@@ -79,7 +81,8 @@ unsigned problem_status(enum problem_kind kind);
 /* What `type` ends with: kinds may share one. */
 const char *problem_name(enum problem_kind kind);
 
-/* JSON text (free), NULL when out of memory. The request id is part of `instance`; retry_after_seconds 0: not said. */
+/* JSON text (free), NULL when out of memory. The request id is part of `instance`; NULL: there is none.
+ * retry_after_seconds 0: not said. */
 char *problem_to_json(const struct problem *problem, const char *request_id, unsigned retry_after_seconds);
 
 /* One step of a JSON pointer with its escapes, appended to pointer (size bytes, cut on a character's boundary when too long). */

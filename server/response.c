@@ -6,6 +6,7 @@
 #include "server/cors.h"
 #include "server/entity_tag.h"
 #include "server/image_cache.h"
+#include "server/library_answers.h"
 #include "server/service.h"
 
 #include <gnutls/gnutls.h>
@@ -14,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <time.h>
 
 struct MHD_Response *response_create(struct request *request, char *data, size_t size)
 {
@@ -84,8 +86,10 @@ enum MHD_Result response_send(struct request *request, unsigned status, struct M
 	response_set(response, "X-Request-Id", request->id);
 	if (request->closes || connection_is_surplus(request->socket))
 		response_set(response, "Connection", "close");
+	if (!request->is_accepted)
+		connection_linger(request->socket);
 	connection_work(request->socket);
-	enum MHD_Result result = MHD_queue_response(request->connection, status, response);
+	enum MHD_Result result = library_queue_response(request->connection, status, response);
 	MHD_destroy_response(response);
 	if (result == MHD_YES)
 		request->status = status;
@@ -185,35 +189,72 @@ enum MHD_Result response_send_json(struct request *request, unsigned status, jso
 
 /* Past libmicrohttpd, to the client's end of the connection. The text is far smaller than a socket's buffer; a client that reads nothing
  * gets nothing. */
-static bool send_past(struct request *request, const char *data, size_t size)
+static bool send_past(struct MHD_Connection *connection, const char *data, size_t size)
 {
-	const union MHD_ConnectionInfo *tls = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);
-	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-	if (request->service->config->tls_cert)
-		return tls && gnutls_record_send((gnutls_session_t)tls->tls_session, data, size) > 0;
+	const union MHD_ConnectionInfo *tls = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);
+	const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+	if (tls && tls->tls_session)
+		return gnutls_record_send((gnutls_session_t)tls->tls_session, data, size) > 0;
 	return info && send(info->connect_fd, data, size, MSG_NOSIGNAL | MSG_DONTWAIT) > 0;
+}
+
+/* headers: those of this answer, each with its end of line. */
+static bool write_past(struct MHD_Connection *connection, struct connection *socket, unsigned status, const char *headers, const char *body)
+{
+	struct text answer = {0};
+	char date[40];
+	struct tm utc;
+	const time_t now = time(NULL);
+	strftime(date, sizeof date, "%a, %d %b %Y %H:%M:%S GMT", gmtime_r(&now, &utc));
+	text_printf(&answer,
+		    "HTTP/1.1 %u %s\r\nDate: %s\r\nConnection: close\r\nContent-Type: application/problem+json\r\n"
+		    "Cache-Control: " CACHE_NONE "\r\n%sContent-Length: %zu\r\n\r\n%s",
+		    status, MHD_get_reason_phrase_for(status), date, headers, strlen(body), body);
+	const bool sent = !answer.failed && send_past(connection, answer.data, answer.length);
+	text_finish(&answer);
+	connection_linger(socket);
+	return sent;
+}
+
+enum MHD_Result response_send_problem_past(struct request *request)
+{
+	struct text headers = {0};
+	const char *origin = cors_origin(request);
+	char timing[SERVER_TIMING_SIZE];
+	const unsigned status = problem_status(request->problem.kind);
+	format_timing(request, timing);
+	metrics_count_problem(request->service->metrics, request->problem.kind);
+	text_printf(&headers, "Server-Timing: %s\r\nX-Request-Id: %s\r\n", timing, request->id);
+	if (origin)
+		text_printf(&headers, "Access-Control-Allow-Origin: %s\r\nVary: Origin\r\n", origin);
+	char *body = problem_to_json(&request->problem, request->id, 0);
+	if (body && !headers.failed && write_past(request->connection, request->socket, status, headers.data, body))
+		request->status = status, request->bytes = strlen(body);
+	free(body);
+	text_finish(&headers);
+	return MHD_NO;
+}
+
+void response_write_problem_past(struct MHD_Connection *connection, struct connection *socket, const struct problem *problem)
+{
+	char *body = problem_to_json(problem, NULL, 0);
+	if (body)
+		write_past(connection, socket, problem_status(problem->kind), "", body);
+	free(body);
+}
+
+void response_end_past(struct MHD_Connection *connection)
+{
+	const union MHD_ConnectionInfo *tls = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);
+	const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+	if (tls && tls->tls_session)
+		gnutls_bye((gnutls_session_t)tls->tls_session, GNUTLS_SHUT_WR);
+	if (info)
+		shutdown(info->connect_fd, SHUT_WR);
 }
 
 enum MHD_Result response_refuse_body(struct request *request, uint64_t limit)
 {
-	struct text answer = {0};
-	const char *origin = cors_origin(request);
-	char timing[SERVER_TIMING_SIZE];
-	format_timing(request, timing);
 	problem_set(&request->problem, PROBLEM_TOO_LARGE, "A body has at most %llu bytes.", (unsigned long long)limit);
-	metrics_count_problem(request->service->metrics, request->problem.kind);
-	char *body = problem_to_json(&request->problem, request->id, 0);
-	if (body) {
-		text_printf(&answer,
-			    "HTTP/1.1 413 Content Too Large\r\nContent-Type: application/problem+json\r\nContent-Length: %zu\r\n"
-			    "Cache-Control: " CACHE_NONE "\r\nServer-Timing: %s\r\n%s%s%sX-Request-Id: %s\r\n"
-			    "Connection: close\r\n\r\n%s",
-			    strlen(body), timing, origin ? "Access-Control-Allow-Origin: " : "", origin ? origin : "", origin ? "\r\n" : "",
-			    request->id, body);
-		if (!answer.failed && send_past(request, answer.data, answer.length))
-			request->status = problem_status(PROBLEM_TOO_LARGE), request->bytes = strlen(body);
-	}
-	free(body);
-	text_finish(&answer);
-	return MHD_NO;
+	return response_send_problem_past(request);
 }

@@ -34,8 +34,14 @@ enum MHD_Result response_send_document(struct request *request, char *text, cons
 /* Likewise JSON; root is taken over. */
 enum MHD_Result response_send_json(struct request *request, unsigned status, json_t *root, const char *cache_control);
 
-/* 413 while a body of more than `limit` bytes is still coming in. libmicrohttpd takes no response then, so the answer is written to the
- * socket; the connection closes. */
+/* Sends request->problem where libmicrohttpd takes no response: while a body is still coming in, or for what it cannot read. The answer is
+ * written to the socket. MHD_NO: the connection closes, and what the client still sends is read for a while (lingering.h). */
+enum MHD_Result response_send_problem_past(struct request *request);
+/* Likewise a problem of what is no request, so that nothing is counted. */
+void response_write_problem_past(struct MHD_Connection *connection, struct connection *socket, const struct problem *problem);
+/* Nothing that libmicrohttpd writes from here on is sent. */
+void response_end_past(struct MHD_Connection *connection);
+/* 413 while a body of more than `limit` bytes is still coming in. */
 enum MHD_Result response_refuse_body(struct request *request, uint64_t limit);
 
 #endif

@@ -48,7 +48,7 @@ enum MHD_Result route_metrics(struct request *request)
 		.queue_pixels_limit = 1e6 * service->config->queue_mpixels,
 		.backlog_ms = render_queue_backlog_ms(service->queue),
 		.connections = connections_count(service->connections),
-		.connections_limit = (size_t)service->config->connections,
+		.connections_limit = connections_total(service->connections),
 		.memory_bytes = service->memory_bytes,
 		.memory_limit = (size_t)service->config->memory_mb << 20,
 		.intake = intake_look(service->intake),

@@ -144,6 +144,7 @@ struct service *service_create(const struct config *config)
 	const struct connections_params watched = {.total = (size_t)config->connections,
 						   .per_address = (size_t)config->connections_per_address,
 						   .read_ms = 1e3 * config->read_timeout_s,
+						   .is_encrypted = config->tls_cert != NULL,
 						   .tick = drop_over,
 						   .context = service};
 	service->connections = connections_create(&watched);

@@ -32,17 +32,13 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	(void)argv;
 	char *kernel = getenv("STRATUS_KERNEL"), *module = getenv("STRATUS_IMAGE_MODULE");
 	FUZZ_REQUIRE(mkdtemp(state_dir));
-	char *flags[] = {"stratusd",
-			 "--listen=127.0.0.1:0",
-			 "--timeout-ms=250",
-			 "--reference-mpaths=1",
-			 "--log-level=error",
-			 "--state-dir",
-			 state_dir,
-			 "--kernel",
-			 kernel ? kernel : "build/mie.kernel",
-			 "--image-module",
-			 module ? module : "build/stratus-image.so"};
+	char *flags[] = {"stratusd",          "--listen=127.0.0.1:0",
+			 "--timeout-ms=250",  "--reference-mpaths=1",
+			 "--header-max-kb=1", /* so that the limits are within reach of an input */
+			 "--body-max-kb=2",   "--log-level=error",
+			 "--state-dir",       state_dir,
+			 "--kernel",          kernel ? kernel : "build/mie.kernel",
+			 "--image-module",    module ? module : "build/stratus-image.so"};
 	FUZZ_REQUIRE(config_parse(sizeof flags / sizeof *flags, flags, &config) == CONFIG_RUN);
 	log_set_level((enum log_level)config.log_level);
 	service = service_create(&config);

@@ -1,6 +1,7 @@
 #include "clients/film.h"
 
 #include "clients/client.h"
+#include "clients/output_file.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -10,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -87,33 +87,18 @@ static bool spawn(struct film *film, const struct form *form, double frames_per_
 	return error == 0;
 }
 
-static bool make_temporary(struct film *film)
-{
-	const mode_t mask = umask(0);
-	umask(mask);
-	const int fd = mkstemp(film->temporary);
-	const bool made = fd >= 0 && fchmod(fd, 0666 & ~mask) == 0;
-	if (!made)
-		client_error("%s: %s", film->path, strerror(errno));
-	if (fd >= 0)
-		close(fd);
-	else
-		film->temporary[0] = '\0';
-	return made;
-}
-
 struct film *film_begin(const char *path, double frames_per_s, const char *comment)
 {
 	struct film *film = calloc(1, sizeof *film);
 	if (film)
 		film->pipe = -1;
-	if (!film || !(film->path = strdup(path)) || asprintf(&film->temporary, "%s.XXXXXX", path) < 0) {
+	if (!film || !(film->path = strdup(path))) {
 		client_error("out of memory");
 		film_end(film, false);
 		return NULL;
 	}
 	signal(SIGPIPE, SIG_IGN); /* an encoder that ended is told by write */
-	if (make_temporary(film) && spawn(film, form_of(path), frames_per_s, comment))
+	if ((film->temporary = output_file_begin(path)) && spawn(film, form_of(path), frames_per_s, comment))
 		return film;
 	film_end(film, false);
 	return NULL;
@@ -160,13 +145,9 @@ int film_end(struct film *film, bool whole)
 	if (whole && !encoded) {
 		client_error("%s: ffmpeg failed", film->path);
 		status = CLIENT_UNWRITABLE;
-	} else if (whole && rename(film->temporary, film->path) != 0) {
-		client_error("%s: %s", film->path, strerror(errno));
-		status = CLIENT_UNWRITABLE;
 	}
-	if ((!whole || status != CLIENT_OK) && film->temporary && *film->temporary)
-		unlink(film->temporary);
-	free(film->temporary);
+	if (!output_file_end(film->temporary, film->path, whole && encoded))
+		status = CLIENT_UNWRITABLE;
 	free(film->path);
 	free(film);
 	return status;

@@ -32,13 +32,29 @@ static mode_t new_file_mode(void)
 	return 0666 & ~mask;
 }
 
+/* Beside its final name; the caller frees *temporary. Below 0: errno says why, nothing was made. */
+static int open_temporary(const char *path, mode_t mode, char **temporary)
+{
+	if (asprintf(temporary, "%s.XXXXXX", path) < 0) {
+		*temporary = NULL;
+		errno = ENOMEM;
+		return -1;
+	}
+	const int fd = mkstemp(*temporary);
+	if (fd < 0 || fchmod(fd, mode) == 0)
+		return fd;
+	const int error = errno;
+	close(fd);
+	unlink(*temporary);
+	errno = error;
+	return -1;
+}
+
 static bool replace_file(const char *path, mode_t mode, const void *data, size_t size)
 {
 	char *temporary;
-	if (asprintf(&temporary, "%s.XXXXXX", path) < 0)
-		return false;
-	const int fd = mkstemp(temporary);
-	bool done = fd >= 0 && write_all(fd, data, size) && fchmod(fd, mode) == 0;
+	const int fd = open_temporary(path, mode, &temporary);
+	bool done = fd >= 0 && write_all(fd, data, size);
 	int error = errno;
 	if (fd >= 0 && close(fd) != 0 && done) {
 		done = false;
@@ -84,4 +100,30 @@ bool output_file_write(const char *path, const void *data, size_t size)
 	if (!done)
 		client_error("%s: %s", strcmp(path, "-") == 0 ? "standard output" : path, strerror(errno));
 	return done;
+}
+
+char *output_file_begin(const char *path)
+{
+	char *temporary;
+	const int fd = open_temporary(path, new_file_mode(), &temporary);
+	if (fd >= 0) {
+		close(fd);
+		return temporary;
+	}
+	client_error("%s: %s", path, strerror(errno));
+	free(temporary);
+	return NULL;
+}
+
+bool output_file_end(char *temporary, const char *path, bool whole)
+{
+	if (!temporary)
+		return !whole;
+	const bool done = whole && rename(temporary, path) == 0;
+	if (whole && !done)
+		client_error("%s: %s", path, strerror(errno));
+	if (!done)
+		unlink(temporary);
+	free(temporary);
+	return done || !whole;
 }

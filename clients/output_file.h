@@ -9,4 +9,12 @@
  * output; devices and pipes are written directly. false after a message. */
 bool output_file_write(const char *path, const void *data, size_t size);
 
+/* For what another program writes: makes an empty file beside the final name, and returns its name for output_file_end. NULL after a
+ * message. */
+char *output_file_begin(const char *path);
+
+/* Gives it the final name if it is whole, else removes it; frees temporary. NULL as temporary: there is nothing, which is an error only of
+ * something whole. false after a message. */
+bool output_file_end(char *temporary, const char *path, bool whole);
+
 #endif

@@ -1,13 +1,13 @@
 #include "clients/plot.h"
 
 #include "clients/client.h"
+#include "clients/output_file.h"
 
 #include <errno.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -22,24 +22,13 @@ bool plot_is_named(const char *path)
 	return strcasecmp(extension_of(path), ".png") == 0 || strcasecmp(extension_of(path), ".svg") == 0;
 }
 
-static void finish(struct plot *plot)
+/* false after a message, when a whole figure found no place. */
+static bool finish(struct plot *plot, bool whole)
 {
+	const bool done = output_file_end(plot->temporary, plot->path, whole);
 	free(plot->path);
-	free(plot->temporary);
 	*plot = (struct plot){0};
-}
-
-static bool make_temporary(struct plot *plot)
-{
-	const mode_t mask = umask(0);
-	umask(mask);
-	const int fd = mkstemp(plot->temporary);
-	const bool made = fd >= 0 && fchmod(fd, 0666 & ~mask) == 0;
-	if (!made)
-		client_error("%s: %s", plot->path, strerror(errno));
-	if (fd >= 0)
-		close(fd);
-	return made;
+	return done;
 }
 
 /* A text in single quotes, in which gnuplot doubles them. */
@@ -54,15 +43,16 @@ static void write_quoted(FILE *to, const char *text)
 bool plot_begin(struct plot *plot, const char *path, int width, int height)
 {
 	*plot = (struct plot){.path = strdup(path)};
-	if (!plot->path || asprintf(&plot->temporary, "%s.XXXXXX", path) < 0) {
-		plot->temporary = NULL;
+	if (!plot->path) {
 		client_error("out of memory");
-		finish(plot);
 		return false;
 	}
 	signal(SIGPIPE, SIG_IGN); /* a gnuplot that is not there is told by its status */
-	if (!make_temporary(plot) || !(plot->to = popen("gnuplot", "we"))) {
-		finish(plot);
+	plot->temporary = output_file_begin(path);
+	if (plot->temporary && !(plot->to = popen("gnuplot", "we")))
+		client_error("gnuplot: %s", strerror(errno));
+	if (!plot->to) {
+		finish(plot, false);
 		return false;
 	}
 	const bool vector = strcasecmp(extension_of(path), ".svg") == 0;
@@ -82,12 +72,6 @@ int plot_end(struct plot *plot)
 		client_error("figures want gnuplot, which is not installed (apt-get install gnuplot-nox)");
 	else if (!good)
 		client_error("%s: gnuplot failed", plot->path);
-	if (good && rename(plot->temporary, plot->path) != 0) {
-		client_error("%s: %s", plot->path, strerror(errno));
-		good = false;
-	}
-	if (!good)
-		unlink(plot->temporary);
-	finish(plot);
+	good = finish(plot, good) && good;
 	return good ? CLIENT_OK : CLIENT_UNWRITABLE;
 }

@@ -14,9 +14,7 @@ BUILD = ROOT / os.environ.get("STRATUS_BUILD", "build")
 PICTURE = b"\x89PNG of sorts" * 100
 
 
-class Handler(http.server.BaseHTTPRequestHandler):
-    protocol_version = "HTTP/1.1"
-
+class Answerer(http.server.BaseHTTPRequestHandler):
     def log_message(self, *_):
         pass
 
@@ -28,6 +26,10 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
+
+
+class Handler(Answerer):
+    protocol_version = "HTTP/1.1"
 
     def picture(self):
         self.answer(200, "image/png", PICTURE, [("Server-Timing", "view;dur=2.5, total;dur=4")])

@@ -3,7 +3,6 @@
 import http.server
 import json
 import os
-import pathlib
 import re
 import stat
 import subprocess
@@ -11,8 +10,8 @@ import threading
 
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = ROOT / os.environ.get("STRATUS_BUILD", "build")
+from conftest import BUILD, Answerer
+
 IMAGE = b"\x89PNG not really" * 1000
 PRESETS = [
     {"name": "noon", "title": "High sun", "description": "", "scene": {"sun": {"elevation_deg": 60}}},
@@ -27,19 +26,7 @@ PROBLEM = {
 }
 
 
-class Handler(http.server.BaseHTTPRequestHandler):
-    def log_message(self, *_):
-        pass
-
-    def answer(self, status, kind, body, headers=()):
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(body)))
-        for name, value in headers:
-            self.send_header(name, value)
-        self.end_headers()
-        self.wfile.write(body)
-
+class Handler(Answerer):
     def do_GET(self):
         self.server.seen.append(self)
         if self.path.startswith("/v1/assets"):
@@ -53,7 +40,6 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         self.server.seen.append(self)
         self.server.reply(self)
-
 
     def do_PUT(self):
         if "Content-Length" in self.headers:

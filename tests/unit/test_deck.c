@@ -5,6 +5,7 @@
 
 #include "renderer/log.h"
 #include "renderer/scene_map.h"
+#include "tests/unit/numbers.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -66,11 +67,6 @@ static void without_radiosity_nothing_comes_back(void **state)
 	scene.radiosity.enabled = true;
 	assert_true(deck_measure(deck, &scene, &found));
 	assert_true(worst_of(found.ground, wanted.ground) > 0.5);
-}
-
-static double element(const json_t *row, size_t i)
-{
-	return json_number_value(json_array_get(row, i));
 }
 
 /* The rows are for sunlight alone: the sky's part of what was measured is taken off as the solver has it. */

@@ -2,6 +2,7 @@
 #include "renderer/optics/kernel.h"
 #include "renderer/optics/mie.h"
 #include "renderer/optics/optics.h"
+#include "tests/unit/numbers.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -99,13 +100,6 @@ static void kernel_against_spheres(void **state)
 }
 
 /* --- against the reference distribution --------------------------------------------------------------------------------------- */
-
-static double number(const json_t *object, const char *key)
-{
-	const json_t *value = json_object_get(object, key);
-	assert_true(json_is_number(value));
-	return json_number_value(value);
-}
 
 static double fogbow_angle(const struct optics *optics, int band)
 {

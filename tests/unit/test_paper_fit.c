@@ -3,6 +3,7 @@
 #include "renderer/optics/kernel.h"
 #include "renderer/optics/paper_fit.h"
 #include "renderer/optics/paper_fit_solve.h"
+#include "tests/unit/numbers.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -24,12 +25,6 @@ struct fixture {
 	struct slab_solution *solution;
 	struct paper_fit_table table;
 };
-
-static void assert_near(double value, double expected, double tolerance, const char *what)
-{
-	if (!(fabs(value - expected) <= tolerance))
-		fail_msg("%s: %.9g instead of %.9g (%+.3g)", what, value, expected, value - expected);
-}
 
 /* 0..1, the same in every run. */
 static double random_unit(void)

@@ -3,6 +3,7 @@
 #include "renderer/optics/kernel.h"
 #include "renderer/optics/paper_radiance.h"
 #include "renderer/optics/quadrature.h"
+#include "tests/unit/numbers.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -38,12 +39,6 @@ static void fixture_clear(struct fixture *fixture)
 	slab_destroy(fixture->solution);
 	free(fixture->forward);
 	optics_destroy(fixture->optics);
-}
-
-static void assert_near(double value, double expected, double tolerance, const char *what)
-{
-	if (!(fabs(value - expected) <= tolerance))
-		fail_msg("%s: %.9g instead of %.9g (%+.3g)", what, value, expected, value - expected);
 }
 
 static struct paper_layer layer_of(const struct fixture *fixture, int band, double tau, double mu_l)

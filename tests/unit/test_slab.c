@@ -1,6 +1,7 @@
 /* The solved slab. Wants build/mie.kernel, or the file that STRATUS_KERNEL names. STRATUS_SLAB_DROPLETS: how many random distributions. */
 #include "renderer/optics/kernel.h"
 #include "renderer/optics/slab.h"
+#include "tests/unit/numbers.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -22,26 +23,6 @@ struct fixture {
 	struct slab_solution *solution;
 	json_t *reference;
 };
-
-static double number(const json_t *object, const char *key)
-{
-	const json_t *value = json_object_get(object, key);
-	assert_true(json_is_number(value));
-	return json_number_value(value);
-}
-
-static double element(const json_t *array, size_t i)
-{
-	const json_t *value = json_array_get(array, i);
-	assert_true(json_is_number(value));
-	return json_number_value(value);
-}
-
-static void assert_near(double value, double expected, double tolerance, const char *what)
-{
-	if (!(fabs(value - expected) <= tolerance))
-		fail_msg("%s: %.9g instead of %.9g (%+.3g)", what, value, expected, value - expected);
-}
 
 /* 0..1, the same in every run. */
 static double random_unit(void)

@@ -4,6 +4,7 @@
 #include "renderer/optics/photon_phase.h"
 #include "renderer/optics/quadrature.h"
 #include "renderer/optics/slab_photons.h"
+#include "tests/unit/numbers.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -34,26 +35,6 @@ struct fixture {
 /* Those of the reference's radiances. */
 static const double zenith_deg[VIEWS] = {0, 15, 30, 45, 60, 75}, azimuth_deg[AZIMUTHS] = {0, 45, 90, 135, 180};
 static double views[VIEWS], azimuths[AZIMUTHS];
-
-static double number(const json_t *object, const char *key)
-{
-	const json_t *value = json_object_get(object, key);
-	assert_true(json_is_number(value));
-	return json_number_value(value);
-}
-
-static double element(const json_t *array, size_t i)
-{
-	const json_t *value = json_array_get(array, i);
-	assert_true(json_is_number(value));
-	return json_number_value(value);
-}
-
-static void assert_near(double value, double expected, double tolerance, const char *what)
-{
-	if (!(fabs(value - expected) <= tolerance))
-		fail_msg("%s: %.9g instead of %.9g (%+.3g)", what, value, expected, value - expected);
-}
 
 static struct photon_params params_for(const struct optics *optics, double tau, double sun_deg, uint64_t photons)
 {

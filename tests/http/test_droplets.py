@@ -237,7 +237,7 @@ def test_bounds_of_memory_and_disk(restart):
 
 
 def test_full_line(start_faulty):
-    daemon = start_faulty("--queue-length", "1")
+    daemon = start_faulty("--queue-length", "2")  # one that is rendered has a place as well
     with concurrent.futures.ThreadPoolExecutor(12) as pool:
         with daemon.busy():
             running = [pool.submit(daemon.render, scene(11 + i / 16)) for i in range(12)]

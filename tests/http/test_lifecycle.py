@@ -15,7 +15,7 @@ SMALL = {"width": 64, "height": 48}
 
 
 def test_full_queue(start_faulty):
-    daemon = start_faulty("--queue-length", "1")
+    daemon = start_faulty("--queue-length", "2")  # one that is rendered has a place as well
     scenes = [{"clouds": {"seed": i}, "output": SMALL} for i in range(8)]
     with concurrent.futures.ThreadPoolExecutor(len(scenes)) as pool:
         with daemon.busy():

@@ -329,11 +329,10 @@ def test_what_needs_no_renderer_does_not_wait_for_it(standing):
 
     with daemon.busy():
         ask_for_all()
-    client = send(daemon, {"model": {"name": "reference", "samples": 4096}, "output": {"width": 320, "height": 240}})
-    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2 and daemon.metric("stratus_queue_depth") == 0)
-    for _ in range(20):
-        ask_for_all()
-    assert daemon.metric("stratus_requests_in_flight") == 2, "the render ended too soon to show anything"
-    client.close()
+    with send(daemon, {"model": {"name": "reference", "samples": 4096}, "output": {"width": 320, "height": 240}}):
+        assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2 and daemon.metric("stratus_queue_depth") == 0)
+        for _ in range(20):
+            ask_for_all()
+        assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 2), "the render ended too soon to show anything"
     # The quickest of each: whoever waits for a renderer that is busy throughout waits each time, whoever shares a processor now and then.
     assert all(min(times) < 50 for times in took.values()), took

@@ -147,11 +147,11 @@ run_sanitized() {
 # What threads share, with the sanitizer that sees a lock missing.
 run_threads() {
 	local log=$results/threads name is_alone=1 programs=()
-	for name in render_queue fair_order flight image_cache intake worker_pool cache api_keys asset_store cost_model lingering log; do
+	for name in render_queue fair_order flight image_cache intake worker_pool cache api_keys asset_store cost_model decoder lingering log; do
 		programs+=("build/san-thread/tests/test_$name")
 	done
 	echo "== again with SAN=thread"
-	if ! make --no-print-directory -j"$(nproc)" SAN=thread "${programs[@]}" >"$log" 2>&1; then
+	if ! make --no-print-directory -j"$(nproc)" SAN=thread build/san-thread/stratus-image.so "${programs[@]}" >"$log" 2>&1; then
 		cat "$log"
 		count 0 1
 		return

@@ -323,7 +323,7 @@ def test_paper_orders_conserve(daemon):
 def test_photons_against_solved(daemon, tau, zenith, droplets, phase):
     layer = {"optical_thickness": tau, "sun_zenith_deg": zenith, "orders": phase, "relative_azimuth_deg": [0, 60, 120], **droplets}
     solved = slab(daemon, **layer)
-    traced = slab(daemon, shading="montecarlo", photons=80000, seed=5, **layer)
+    traced = slab(daemon, shading="montecarlo", photons=200000, seed=5, **layer)
     error = traced["standard_error"]
     close = []
     for name in FLUXES:

@@ -69,6 +69,7 @@ struct light_path {
 	float next;    // m, where it is scattered next
 	float weight;  // of the way up to there, as path_sun_weight counts it
 	float reach;   // m, up to the end of the layer
+	float behind;  // length over which ways that bend may go on there, over the reach
 	float whole;   // of it as it is weighed
 	int cloudy;    // parts of that way that are expected to lie in cloud, as a bit set
 	vec2 looked;   // scales of the shares of forward scatterings that are looked for in those parts and elsewhere

@@ -23,6 +23,7 @@ const float PATH_PARTS_BEND = 12.0;
 const float PATH_BESIDE = 0.3;
 const float PATH_AWAY = 0.015;
 const float PATH_IN_VAIN = 1.5;
+const float PATH_BEND = 0.1; // rad, by which ways bend
 const float PATH_SURE = 4.0; // optical thickness
 const float PATH_MOST = 6.0;
 
@@ -56,6 +57,18 @@ float path_part_share(int cloudy, vec2 looked, int part)
 	return path_part_cloudy(cloudy, part) ? looked.x : looked.y * ((((cloudy << 1) >> part) & 5) != 0 ? PATH_BESIDE : PATH_AWAY);
 }
 
+// The same behind the last part: ways that bend down leave the layer later than the straight one. It falls as an exponential, of a length in parts of the whole way.
+float path_behind_length(float mu_sun)
+{
+	return clamp(PATH_BEND * inversesqrt(max(mu_sun * mu_sun, 1e-4)), 0.05, 1.0);
+}
+
+float path_share_at(light_path path, float way)
+{
+	float behind = path_part_share(path.cloudy, path.looked, PATH_PARTS) * exp(-max(way - 1.0, 0.0) / path.behind);
+	return way < 1.0 ? path_part_share(path.cloudy, path.looked, path_part_at(way)) : behind;
+}
+
 // Draws where the path is scattered next: x of a uniform density over the rest of the ways as they are weighed.
 void path_sun_draw_next(INOUT(light_path) path)
 {
@@ -70,13 +83,15 @@ void path_sun_draw_next(INOUT(light_path) path)
 		at = at < 0.0 && rest <= size * part_share ? from + rest / part_share : at;
 		rest -= size * part_share;
 	}
-	path.next = path.left == 0 ? 1e9 : (at < 0.0 ? 1.0 : at) * path.reach;
+	float behind = path_part_share(path.cloudy, path.looked, PATH_PARTS) * path.behind;
+	at = at < 0.0 ? 1.0 - path.behind * log(max(1.0 - rest / max(behind, 1e-9), 1e-6)) : at;
+	path.next = path.left == 0 ? 1e9 : at * path.reach;
 }
 
-// The whole way, weighed, over its length.
-float path_sun_whole(int cloudy, vec2 looked)
+// The whole way and what may lie behind it, weighed, over its length.
+float path_sun_whole(int cloudy, vec2 looked, float behind)
 {
-	float sum = 0.0;
+	float sum = path_part_share(cloudy, looked, PATH_PARTS) * behind;
 	for (int i = 0; i < PATH_PARTS; i++)
 		sum += (path_part_start(i + 1) - path_part_start(i)) * path_part_share(cloudy, looked, i);
 	return sum;
@@ -134,14 +149,16 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 	vec3 peak = vec3(extinction) - vec3(extinction_modified);
 	float hero_peak = path_of_hero(peak, path.hero);
 	path.reach = path_sun_reach(height, mu_sun);
-	path.cloudy = path_sun_look(place, height, mu_sun, path.reach, PATH_MOST / hero_peak);
+	path.behind = path_behind_length(mu_sun);
+	// What is looked for must not depend on the hero: the bands' densities would be of different ways.
+	path.cloudy = path_sun_look(place, height, mu_sun, path.reach, PATH_MOST / peak.y);
 	path.arc = 0.0;
 	path.weight = 0.0;
-	float expected = path_sun_whole(path.cloudy, vec2(1.0, 0.0)) * path.reach;
+	float expected = path_sun_whole(path.cloudy, vec2(1.0, 0.0), path.behind) * path.reach;
 	// Long ways to a low sun lie in the open, or lead through so much cloud that light takes another: no more scatterings are looked for there than light makes.
-	float in_vain = path_sun_whole(path.cloudy, vec2(0.0, 1.0)) * path.reach;
-	path.looked = min(vec2(1.0), vec2(2.0 * PATH_MOST, PATH_IN_VAIN) / max(hero_peak * vec2(expected, in_vain), vec2(1e-6)));
-	path.whole = path_sun_whole(path.cloudy, path.looked);
+	float in_vain = path_sun_whole(path.cloudy, vec2(0.0, 1.0), path.behind) * path.reach;
+	path.looked = min(vec2(1.0), vec2(2.0 * PATH_MOST, PATH_IN_VAIN) / max(peak.y * vec2(expected, in_vain), vec2(1e-6)));
+	path.whole = path_sun_whole(path.cloudy, path.looked, path.behind);
 
 	float patience = clamp(worth * exp(-path_of_hero(vec3(extinction_modified), path.hero) * expected * min(10.0 * abs(mu_sun), 1.0)), 0.03, 1.0);
 	bool looks = path_random(path) < patience;
@@ -178,7 +195,7 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 // A free path of the search ends inside the cloud or outside of it. false when nothing is left.
 bool path_sun_collides(INOUT(light_path) path, bool inside, float largest)
 {
-	bool expected = path_part_sure(path, path_part_at(path.arc / path.reach));
+	bool expected = path.arc < path.reach && path_part_sure(path, path_part_at(path.arc / path.reach));
 	vec3 factor = vec3(1.0) - vec3(extinction) * ((inside ? 1.0 : 0.0) - (expected ? 1.0 : 0.0)) / largest;
 	// Where cloud is unexpected hardly anything is left.
 	float most = clamp(max(factor.x, max(factor.y, factor.z)), 0.0, 1.0);
@@ -199,7 +216,7 @@ vec3 path_sun_arrives(light_path path)
 // The next forward scattering, in cloud.
 void path_sun_turns(INOUT(light_path) path)
 {
-	path.sun /= path_part_share(path.cloudy, path.looked, path_part_at(path.arc / path.reach));
+	path.sun /= path_share_at(path, path.arc / path.reach);
 	path.left = max(path.left - 1, 0);
 	path.direction = path_sun_direction(path, path_sun_texel(path));
 	path_sun_draw_next(path);

@@ -141,6 +141,7 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.grounded = 0;
 	path.arc = 0.0;
 	path.reach = 1.0;
+	path.behind = 1.0;
 	path.cloudy = 0;
 	path.looked = vec2(1.0);
 	path.mean = 0.0;
@@ -414,6 +415,9 @@ void reference_step(INOUT(light_path) path)
 	path.place += path.direction * t;
 	path.arc += t;
 	float height = path_height(path.place) - cloud_layer.x;
+	// Not beyond the layer's end.
+	float beyond = height < 0.0 ? height : max(height - cloud_layer.y, 0.0);
+	path.arc -= clamp(beyond / (abs(mu) < 1e-4 ? 1e-4 : mu), 0.0, t);
 	path.top = path_top(path.place);
 	bool inside = height >= 0.0 && height < path.top;
 	if (height < 0.0 || height > cloud_layer.y) {

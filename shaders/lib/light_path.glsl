@@ -71,7 +71,7 @@ struct light_path {
 	float reach;   // m, up to the end of the layer
 	float behind;  // length over which ways that bend may go on there, over the reach
 	float whole;   // of it as it is weighed
-	int cloudy;    // parts of that way that are expected to lie in cloud, as a bit set
+	ivec2 cloudy;  // parts of that way that are expected to lie in cloud, as a bit set; and near cloud
 	vec2 looked;   // scales of the shares of forward scatterings that are looked for in those parts and elsewhere
 	float mean;    // number of forward scatterings that is looked for
 	int left;      // scatterings to come

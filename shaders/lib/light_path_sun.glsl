@@ -18,12 +18,13 @@ const int PATH_CHAIN_ROWS = 64;
 // The way to the sun is looked at in so many parts, short ones first.
 const int PATH_PARTS = 16;
 const float PATH_PARTS_BEND = 12.0;
-// Where no cloud is expected there may be some: share of the forward scatterings looked for beside cloud, and away from it. Every one of them that meets no cloud brings nothing, so that
-// few are worth looking for.
-const float PATH_BESIDE = 0.3;
+// Where no cloud is expected there may be some: share of the forward scatterings looked for near cloud, as far as ways stray from the straight one, and away from it. Every one of them that
+// meets no cloud brings nothing, so that few are worth looking for; but what is found where few are looked for outshines the rest of the picture.
+const float PATH_NEAR = 0.3;
 const float PATH_AWAY = 0.015;
 const float PATH_IN_VAIN = 1.5;
-const float PATH_BEND = 0.1; // rad, by which ways bend
+const float PATH_BEND = 0.1; // rad, by which ways bend at most; and mostly
+const float PATH_STRAY = 0.05;
 const float PATH_SURE = 4.0; // optical thickness
 const float PATH_MOST = 6.0;
 
@@ -48,13 +49,13 @@ bool path_part_cloudy(int cloudy, int part)
 bool path_part_sure(light_path path, int part)
 {
 	float size = (path_part_start(part + 1) - path_part_start(part)) * path.reach;
-	return path_part_cloudy(path.cloudy, part) && size * extinction.y < PATH_SURE;
+	return path_part_cloudy(path.cloudy.x, part) && size * extinction.y < PATH_SURE;
 }
 
 // Share of the forward scatterings in cloud that are looked for in a part.
-float path_part_share(int cloudy, vec2 looked, int part)
+float path_part_share(ivec2 cloudy, vec2 looked, int part)
 {
-	return path_part_cloudy(cloudy, part) ? looked.x : looked.y * ((((cloudy << 1) >> part) & 5) != 0 ? PATH_BESIDE : PATH_AWAY);
+	return path_part_cloudy(cloudy.x, part) ? looked.x : looked.y * (path_part_cloudy(cloudy.y, part) ? PATH_NEAR : PATH_AWAY);
 }
 
 // The same behind the last part: ways that bend down leave the layer later than the straight one. It falls as an exponential, of a length in parts of the whole way.
@@ -89,7 +90,7 @@ void path_sun_draw_next(INOUT(light_path) path)
 }
 
 // The whole way and what may lie behind it, weighed, over its length.
-float path_sun_whole(int cloudy, vec2 looked, float behind)
+float path_sun_whole(ivec2 cloudy, vec2 looked, float behind)
 {
 	float sum = path_part_share(cloudy, looked, PATH_PARTS) * behind;
 	for (int i = 0; i < PATH_PARTS; i++)
@@ -126,19 +127,23 @@ float path_sun_reach(float height, float mu_sun)
 	return max(mu < 0.0 ? (cloud_layer.x - height) / mu : (cloud_layer.x + cloud_layer.y - height) / mu, 0.01);
 }
 
-// Looks at the straight way from a place to the sun: which parts of it lie in cloud, as far as light comes through. furthest: m of cloud.
-int path_sun_look(vec3 place, float height, float mu_sun, float reach, float furthest)
+// Looks at the straight way from a place to the sun: which parts of it lie in cloud (x), as far as light comes through, and which near it (y), the one behind the last among them.
+// furthest: m of cloud.
+ivec2 path_sun_look(vec3 place, float height, float mu_sun, float reach, float furthest)
 {
 	int cloudy = 0;
+	int near = 0;
 	float passed = 0.0;
 	for (int i = 0; i < PATH_PARTS; i++) {
 		float t = 0.5 * (path_part_start(i) + path_part_start(i + 1)) * reach;
 		float over = height - cloud_layer.x + mu_sun * t;
-		bool inside = passed < furthest && over >= 0.0 && over < path_top(place + vec3(sun_direction) * t);
+		float top = path_top(place + vec3(sun_direction) * t);
+		bool inside = passed < furthest && over >= 0.0 && over < top;
 		cloudy |= inside ? 1 << i : 0;
+		near |= top > 0.0 && over < top + PATH_STRAY * t ? 1 << i : 0;
 		passed += inside ? (path_part_start(i + 1) - path_part_start(i)) * reach : 0.0;
 	}
-	return cloudy;
+	return ivec2(cloudy, near | (cloudy << 1) | (cloudy >> 1));
 }
 
 // Begins to look for the sun. place: where the straight way to the sun enters the layer; height above ground, cosine of the sun there; ratio: densities of

@@ -142,7 +142,7 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.arc = 0.0;
 	path.reach = 1.0;
 	path.behind = 1.0;
-	path.cloudy = 0;
+	path.cloudy = ivec2(0);
 	path.looked = vec2(1.0);
 	path.mean = 0.0;
 	path.whole = 0.0;
@@ -399,7 +399,7 @@ void reference_step(INOUT(light_path) path)
 	float over = path_height(path.place) - cloud_layer.x - path_bound(path.place);
 	// Nothing stands so high around here: on to where it might, or to where the search expects cloud.
 	int part = path_part_at(path.arc / path.reach);
-	bool empty = over > 1.0 && !(searches && path_part_cloudy(path.cloudy, part));
+	bool empty = over > 1.0 && !(searches && path_part_cloudy(path.cloudy.x, part));
 	float reach = field_warp_reach(vec2(path.place) / cloud_layer.z) * cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
 	float t = -log(path_random(path)) / largest;
 	if (empty) {

@@ -3,7 +3,8 @@
 // Droplets scatter half of all light by less than 5 degrees. Looking from every scattering straight at the sun would find, once in a thousand times, one that scatters into
 // the middle of that peak, and leave a bright speck. So light is sorted by its last scattering beyond the peak, seen from the camera: from there on it goes to the sun by
 // forward scatterings alone, and that rest is drawn from the sun's side, where its directions come of the peak itself. What is left to evaluate is the phase function
-// outside the peak. Only paths that met nothing but forward scatterings (order 0) look at the sun through the peak.
+// outside the peak. Paths that met nothing but forward scatterings (order 0) have to look at the sun through the peak: from each of these, the rest drawn from the sun's side all the same,
+// and weighed so that the one that bends the way most counts most, which is hardly ever in the middle of the peak (path_bend).
 //
 // Number and places of the forward scatterings are drawn for the cloud that is expected towards the sun, those places a Poisson process on the way; what cloud there
 // really is decides about their weight, and ratio tracking (Novak, Selle and Jarosz 2014, "Residual Ratio Tracking") about what the way lets through beside.
@@ -215,7 +216,7 @@ vec3 path_sun_arrives(light_path path)
 	float expected = 0.0;
 	for (int i = 0; i < PATH_PARTS; i++)
 		expected += path_part_sure(path, i) ? clamp(way - path_part_start(i), 0.0, path_part_start(i + 1) - path_part_start(i)) : 0.0;
-	return path.left == 0 ? path.sun * exp(vec3(path.mean) - vec3(extinction) * (expected * path.reach)) : vec3(0.0);
+	return path.left == 0 ? path.sun * (path.weighed.x / path.weighed.y) * exp(vec3(path.mean) - vec3(extinction) * (expected * path.reach)) : vec3(0.0);
 }
 
 // The next forward scattering, in cloud.
@@ -223,7 +224,9 @@ void path_sun_turns(INOUT(light_path) path)
 {
 	path.sun /= path_share_at(path, path.arc / path.reach);
 	path.left = max(path.left - 1, 0);
+	vec3 before = path.direction;
 	path.direction = path_sun_direction(path, path_sun_texel(path));
+	path.weighed.y += path.weighed.x < 1.0 ? path_bend(0.5 * length(path.direction - before)) : 0.0;
 	path_sun_draw_next(path);
 	path.mode = PATH_SUN;
 }

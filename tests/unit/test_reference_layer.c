@@ -72,6 +72,24 @@ static void low_suns_lose_nothing(void **state)
 	assert_true(fabs(deviation / weights) < 3 / sqrt(weights));
 }
 
+/* Beside the sun all light has been scattered forward alone; no sample of it outshines the others. */
+static void aureoles_are_even(void **state)
+{
+	(void)state;
+	const struct layer_case is = {.tables = tables, .thickness_m = 60, .sun_zenith_deg = 55, .sun = true};
+	struct uniform_layer layer;
+	layer_init(&layer, &is);
+	for (int i = 0; i < 2; i++) {
+		const double mu_v = cos((i == 0 ? 52 : 59) * DEGREE);
+		const struct layer_seen seen = layer_see(&layer, false, mu_v, 0, 60000, THREADS);
+		const double expected = slab_at(&is, 1, false, mu_v, 0);
+		print_message("%d degrees from the sun: %.4f +- %.4f, slab %.4f\n", i == 0 ? 3 : 4, seen.mean[1], seen.error[1], expected);
+		assert_true(seen.error[1] < 0.012 * expected);
+		assert_true(fabs(seen.mean[1] - expected) < 3 * seen.error[1] + 0.01 * expected);
+	}
+	layer_finish(&layer);
+}
+
 /* F0 P/(4 pi) mu_l/(mu_l +- mu_v) (...), of so thin a layer tau P/(4 pi mu_v); what is scattered twice is a share of tau. */
 static void thin_layers_scatter_once(void **state)
 {
@@ -139,6 +157,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(layers_look_as_the_slab_does),
 		cmocka_unit_test(low_suns_lose_nothing),
+		cmocka_unit_test(aureoles_are_even),
 		cmocka_unit_test(thin_layers_scatter_once),
 		cmocka_unit_test(furnace_is_white),
 		cmocka_unit_test(samples_depend_on_the_seed_alone),

@@ -85,8 +85,8 @@ float field_detail_sum(vec2 p, float density, float octaves)
 // its octaves begin at 160 m, in two places a whole number of texels apart; on thick layers it is the rougher. Pixels are hardly larger than its texels wherever sides are told.
 const float FIELD_RUGGED_TILE = 1e4;   // m, about: a whole number of them is a tile
 const float FIELD_RUGGED_APART = 0.40625;
-const float FIELD_RUGGED_SHARE = 0.08; // of the layer's thickness
-const float FIELD_RUGGED_MOST = 35.0;  // m
+const float FIELD_RUGGED_SHARE = 0.1;  // of the layer's thickness
+const float FIELD_RUGGED_MOST = 45.0;  // m
 
 vec2 field_rugged(vec2 place)
 {

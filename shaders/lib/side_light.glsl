@@ -29,6 +29,8 @@ const float SIDE_CLEAR = 40.0;
 const float SIDE_RIM = 0.15;
 // What is left of the light behind counts so much as something at the base.
 const float SIDE_BESIDE = 0.2;
+// Detail is of the thickness, which hardly varies in the middle of a cloud; on its sides, which are the field's edges elsewhere, it is so much more.
+const float SIDE_ROUGHER = 2.5;
 // Views along the layer see it as under this slope, m a metre of height; slices would stand beside each other.
 const float SIDE_SLOPE_MAX = 4.0;
 
@@ -76,7 +78,7 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 	// What lies between slices of a slanted view is not looked at; it would leave hooks and bars.
 	float level = log2(max(length(stride) * SIDE_SIZE, 1e-3)) - SIDE_SHARP;
 	// Elsewhere at each height: no flank is a plane that a view may lie in. Straight up none is seen.
-	vec2 shift = rugged * (min(dot(ahead, ahead), 1.0) / cloud_layer.z);
+	vec2 shift = rugged * (min(length(ahead), 1.0) / cloud_layer.z);
 	for (int i = 1; i < SIDE_SLICES; i++) {
 		tops[i] = packed_linear_between(thickness_packed, uv + stride * SIDE_HEIGHTS[i] + shift, int(SIDE_SIZE), level - (i == 1 ? 1.0 : 0.0));
 		shift = vec2(-shift.y, shift.x);
@@ -151,9 +153,10 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	// On sides detail is more or less of what is met there: added, it would end rims with an edge. A slanted way through the layer is all cloud at most.
 	float side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
 	float whole = mix(base, view.thickness, view.told);
-	vec2 detail = vec2(thickness, inside) - base;
+	float sided = min(side * 8.0, 1.0);
+	vec2 detail = (vec2(thickness, inside) - base) * (1.0 + SIDE_ROUGHER * sided);
 	vec2 part = vec2(whole) / (vec2(whole + 1e-3) + abs(detail));
-	vec2 met = vec2(whole) + detail * mix(vec2(1.0), part, min(side * 8.0, 1.0));
+	vec2 met = vec2(whole) + detail * mix(vec2(1.0), part, sided);
 	met = min(max(met, vec2(0.4 * view.told * view.above)), vec2(cloud_layer.y));
 	lit.thickness = met.x;
 	lit.inside = met.y;

@@ -51,6 +51,16 @@ float side_source(float up, float down)
 	return mix(through, 1.0 - through, down / max(h, 1.0));
 }
 
+// Are all views so flat that no sides are told (side_view.told)? Decided when the shader is built.
+#ifdef FIELD_ALONG
+#if FIELD_ALONG == 1
+#define SIDE_UNTOLD 1
+#endif
+#endif
+#ifndef SIDE_UNTOLD
+#define SIDE_UNTOLD 0
+#endif
+
 // Cloud between two heights where its top is at `top`, m.
 float side_filled(float top, float from, float to)
 {
@@ -70,6 +80,13 @@ struct side_view {
 // place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical; rugged: by how much sides are met elsewhere, m (field_rugged).
 side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 {
+#if SIDE_UNTOLD
+	side_view none;
+	none.told = none.thickness = none.above = none.entry = 0.0;
+	none.place = place;
+	none.clear = 1.0;
+	return none;
+#else
 	vec2 ahead = heading * (min(sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v, SIDE_SLOPE_MAX) * inversesqrt(max(dot(heading, heading), 1e-12)));
 	vec2 uv = field_place(place) / cloud_layer.z;
 	vec2 stride = ahead * (cloud_layer.y / cloud_layer.z);
@@ -117,6 +134,7 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 	view.clear = 1.0 / (1.0 + (dot(seen, entries * entries) - view.entry * view.entry) * (1.0 / (SIDE_CLEAR * SIDE_CLEAR)));
 	view.place = place + ahead * view.entry;
 	return view;
+#endif
 }
 
 // A place of the layer as it is seen from below and lit.
@@ -146,12 +164,17 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	float lod = max(log2(footprint * SIDE_SIZE / cloud_layer.z), 0.0);
 #endif
 	vec4 light = textureLod(side_light, uv, lod);
-	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), 0.0);
 	side_lit lit;
+	float side = 0.0;
+#if SIDE_UNTOLD
+	lit.thickness = lit.sun = thickness;
+	lit.inside = inside;
+#else
+	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), 0.0);
 	thickness = mix(base, thickness, view.clear);
 	inside = mix(base, inside, view.clear);
 	// On sides detail is more or less of what is met there: added, it would end rims with an edge. A slanted way through the layer is all cloud at most.
-	float side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
+	side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
 	float whole = mix(base, view.thickness, view.told);
 	float sided = min(side * 8.0, 1.0);
 	vec2 detail = (vec2(thickness, inside) - base) * (1.0 + SIDE_ROUGHER * sided);
@@ -161,6 +184,7 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	lit.thickness = met.x;
 	lit.inside = met.y;
 	lit.sun = side_beam(thickness, base, mix(base, light.w, view.told));
+#endif
 	float spread = slab_light.w * lit.inside;
 	lit.smooth_m = mix(lit.inside, light.x, spread / (1.0 + spread));
 	lit.light = mix(light.y, light.z, side) / side_transmitted(lit.smooth_m);

@@ -29,6 +29,8 @@ const float SIDE_CLEAR = 40.0;
 const float SIDE_RIM = 0.15;
 // What is left of the light behind counts so much as something at the base.
 const float SIDE_BESIDE = 0.2;
+// Within so much of the surface at both ends a slice counts as little filled, m.
+const float SIDE_ALONG = 12.0;
 // Detail is of the thickness, which hardly varies in the middle of a cloud; on its sides, which are the field's edges elsewhere, it is so much more.
 const float SIDE_ROUGHER = 2.5;
 // Views along the layer see it as under this slope, m a metre of height; slices would stand beside each other.
@@ -107,7 +109,10 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 	float none = max(1.0 - 0.1 * tops.x, 0.0);
 	from.x -= SIDE_NONE * none;
 	vec4 to = vec4(from.y, from.z, from.w, tops.w - ends.w);
-	vec4 filled = (ends - bottoms) * (max(from, vec4(0.0)) + max(to, vec4(0.0))) / (abs(from) + abs(to) + 1e-3);
+	// Along a flank both are next to nothing: of that no edge is made.
+	vec4 both = abs(from) + abs(to);
+	vec4 little = max(vec4(1.0) - both * (0.25 / SIDE_ALONG), vec4(0.0));
+	vec4 filled = (ends - bottoms) * (max(from, vec4(0.0)) + max(to, vec4(0.0))) / (both + SIDE_ALONG * little * little + 1e-3);
 	vec4 begins = ends - mix(filled, ends - bottoms, step(vec4(0.0), from));
 	// Of what is thin at the base both are seen, that and the side behind it.
 	float above = filled.y + filled.z + filled.w;
@@ -176,7 +181,7 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	// On sides detail is more or less of what is met there: added, it would end rims with an edge. A slanted way through the layer is all cloud at most.
 	side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
 	float whole = mix(base, view.thickness, view.told);
-	float sided = min(side * 8.0, 1.0);
+	float sided = min(side * 2.0, 1.0);
 	vec2 detail = (vec2(thickness, inside) - base) * (1.0 + SIDE_ROUGHER * sided);
 	vec2 part = vec2(whole) / (vec2(whole + 1e-3) + abs(detail));
 	vec2 met = vec2(whole) + detail * mix(vec2(1.0), part, sided);

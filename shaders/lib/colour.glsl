@@ -33,7 +33,7 @@ vec3 colour_filmic_hue(vec3 rgb)
 	float square = rgb.x * rgb.x;
 	float share = square * (0.85 + 0.0033 * rgb.x) / ((square + 9.0) * (1.0 + 0.005 * rgb.x));
 	vec2 lack = max(vec2(1.0) - vec2(rgb.y, rgb.z) * (1.0 / max(rgb.x, 1e-9)), vec2(0.0));
-	vec2 kept = vec2(1.0) - share * lack * (vec2(0.3) + 0.7 * lack * lack);
+	vec2 kept = vec2(1.0) - share * lack * (vec2(0.45) + 0.55 * lack * lack);
 	rgb += COLOUR_FILM_FOG * rgb.x;
 	return vec3(colour_filmic(rgb.x), kept * vec2(colour_filmic(rgb.y), colour_filmic(rgb.z)));
 }

@@ -81,6 +81,31 @@ float field_detail_sum(vec2 p, float density, float octaves)
 	return sum;
 }
 
+// Sides of clouds billow on scales that neither the field's texels nor means along a slanted view show: by how much they are met elsewhere, m. The detail serves once more, so large that
+// its octaves begin at 160 m, in two places a whole number of texels apart; on thick layers it is the rougher. Pixels are hardly larger than its texels wherever sides are told.
+const float FIELD_RUGGED_TILE = 1e4;   // m, about: a whole number of them is a tile
+const float FIELD_RUGGED_APART = 0.40625;
+const float FIELD_RUGGED_SHARE = 0.1;  // of the layer's thickness
+const float FIELD_RUGGED_MOST = 45.0;  // m
+
+vec2 field_rugged(vec2 place)
+{
+	vec2 uv = field_place(place) * (max(floor(cloud_layer.z / FIELD_RUGGED_TILE + 0.5), 1.0) / cloud_layer.z);
+#ifdef FIELD_PACKED
+	float size = float(FIELD_DETAIL_SIZE);
+	vec2 p = uv * size - 0.5;
+	vec2 base = floor(p);
+	vec2 f = p - base;
+	base = (base + 0.5) / size;
+	vec4 a = packed_texel(field_detail, fract(base), FIELD_DETAIL_SIZE, size);
+	vec4 b = packed_texel(field_detail, fract(base + FIELD_RUGGED_APART), FIELD_DETAIL_SIZE, size);
+	vec2 shift = mix(mix(vec2(a.x, b.x), vec2(a.y, b.y), f.x), mix(vec2(a.z, b.z), vec2(a.w, b.w), f.x), f.y);
+#else
+	vec2 shift = vec2(textureLod(field_detail, uv, 0.0).x, textureLod(field_detail, uv + FIELD_RUGGED_APART, 0.0).x);
+#endif
+	return min(FIELD_RUGGED_SHARE * cloud_layer.y, FIELD_RUGGED_MOST) * shift;
+}
+
 // The field alone, where pixels are larger than texels. p: place in the drifting field.
 float field_far_at(vec2 p, float octaves)
 {

@@ -155,7 +155,7 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 air = sky_table_coordinates(direction);
 	vec2 unit = up_unit(air);
 	up_ray ray = up_ray_of(direction);
-	side_view side = side_view_at(ray.place, vec2(direction), ray.mu_v);
+	side_view side = side_view_at(ray.place, vec2(direction), ray.mu_v, field_rugged(ray.place));
 #ifdef FIELD_ALONG
 	vec3 layer = field_thickness_along(ray.place, vec2(direction), ray.footprint, ray.mu_v, extinction_scaled.y);
 #if FIELD_ALONG == 2

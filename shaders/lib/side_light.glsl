@@ -104,6 +104,16 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v)
 	return view;
 }
 
+// The same where all views are so flat that nothing is told (FIELD_ALONG_COSINE in shaders/lib/field.glsl is where that begins).
+side_view side_view_along(vec2 place)
+{
+	side_view view;
+	view.told = view.thickness = view.above = view.entry = 0.0;
+	view.place = place;
+	view.clear = 1.0;
+	return view;
+}
+
 // A place of the layer as it is seen from below and lit.
 struct side_lit {
 	float thickness; // m along the vertical that hide as much as the view meets

@@ -6,6 +6,11 @@
 #include "shaders/lib/packed.glsl"
 #include "shaders/lib/view.glsl"
 
+// Decided when the shader is built: are pixels long strips along the layer, all (1) or some (2)?
+#ifndef FIELD_ALONG
+#define FIELD_ALONG 0
+#endif
+
 #ifndef __cplusplus
 uniform sampler2D up_sky;
 uniform sampler2D up_air;
@@ -155,8 +160,12 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 air = sky_table_coordinates(direction);
 	vec2 unit = up_unit(air);
 	up_ray ray = up_ray_of(direction);
+#if FIELD_ALONG == 1
+	side_view side = side_view_along(ray.place);
+#else
 	side_view side = side_view_at(ray.place, vec2(direction), ray.mu_v);
-#ifdef FIELD_ALONG
+#endif
+#if FIELD_ALONG
 	vec3 layer = field_thickness_along(ray.place, vec2(direction), ray.footprint, ray.mu_v, extinction_scaled.y);
 #if FIELD_ALONG == 2
 	if (ray.mu_v >= FIELD_ALONG_COSINE)
@@ -184,7 +193,7 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 half_angle = scattering_half_angle(-vec3(sun_direction), -direction);
 	vec3 first = up_first_at(half_angle, solved_mean_depth(extinction_scaled.y * along_sun, tau.y / ray.mu_v)) *
 	             up_single(tau / ray.mu_v, vec3(extinction_scaled) * along_sun, along_light, along_view);
-#ifdef FIELD_ALONG
+#if FIELD_ALONG
 	first *= layer.y;
 #endif
 	vec4 light = up_light_at(unit, depth_unit);

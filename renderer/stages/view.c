@@ -353,7 +353,8 @@ static bool run_up(struct view_stage *stage, const struct scene_block *block, co
 		for (next = first + 1; next < end; next++)
 			if (reach_of(block, view, variant, next) != reach)
 				break;
-		const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, reach, variant.large_sun);
+		const struct pass *pass =
+			view_up_pass(&stage->up, variant.projection, variant.packed, reach, variant.large_sun, (int)block->cloud_field[2]);
 		if (!pass)
 			return false;
 		run->first_row = first;

@@ -9,7 +9,7 @@
 
 #include "renderer/stages/radiosity.h"
 
-enum { VIEW_UP_AIR_TABLES = 3 };
+enum { VIEW_UP_AIR_TABLES = 3, VIEW_UP_DETAILS = 3 };
 
 /* How far away the layer is in some rows of pixels: anywhere; none is larger than half a texel of the field, nor shows the sun's disc; so
  * low that each, or some, are long strips (FIELD_ALONG_COSINE in shaders/lib/field.glsl). */
@@ -19,7 +19,7 @@ struct view_up_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
 	struct pass *air, *first, *light;
 	/* By view_up_pass's arguments; all but those that most pictures need are made when wanted. */
-	struct pass *look[PROJECTION_COUNT][2][VIEW_UP_REACHES][2];
+	struct pass *look[PROJECTION_COUNT][2][VIEW_UP_REACHES][2][VIEW_UP_DETAILS];
 	struct texture air_tables[VIEW_UP_AIR_TABLES]; /* of the frame in work */
 	struct texture received;                       /* view of radiosity_light.cloud_received */
 };
@@ -40,9 +40,9 @@ void view_up_finish(struct view_up_stage *stage);
 bool view_up_prepare(struct view_up_stage *stage, struct stage_context *context, const struct scene *scene,
 		     const struct view_up_inputs *inputs, struct pass_run *run);
 
-/* The program to run over pixels above the horizon, with the samplers that view_up_prepare left in its run. large_sun: sun_disc.large. NULL
- * after log lines when it does not compile. */
+/* The program to run over pixels above the horizon, with the samplers that view_up_prepare left in its run. large_sun: sun_disc.large;
+ * details: tiles of the field's detail, 1..VIEW_UP_DETAILS. NULL after log lines when it does not compile. */
 const struct pass *view_up_pass(struct view_up_stage *stage, enum projection projection, bool packed, enum view_up_reach reach,
-				bool large_sun);
+				bool large_sun, int details);
 
 #endif

@@ -269,32 +269,37 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 /* Columns that are looked at together whether they are long strips. */
 enum { PIECE_COLUMNS = 32 };
 
-/* A rectangle of pixels up at the layer, whose rows are laid down in `run`. */
-static bool run_up_columns(struct view_stage *stage, const struct scene_block *block, struct view_variant variant, enum view_up_reach reach,
-			   struct pass_run *run, int first, int end)
+/* Pixels that look up at the layer and have this in common; where they lie, and of which picture, is laid down in a run. */
+struct up_pixels {
+	enum projection projection;
+	bool packed;
+	enum view_up_reach reach;
+	enum view_up_disc disc;
+	int details;
+};
+
+static bool run_up_columns(struct view_stage *stage, struct up_pixels pixels, const struct pass_run *run, int first, int end)
 {
-	const struct pass *pass =
-		view_up_pass(&stage->up, variant.projection, variant.packed, reach, variant.large_sun, (int)block->cloud_field[2]);
-	if (!pass)
-		return false;
+	const struct pass *pass = view_up_pass(&stage->up, pixels.projection, pixels.packed, pixels.reach, pixels.disc, pixels.details);
 	struct pass_run columns = *run;
 	columns.first_column = first;
 	columns.width = end - first;
-	pass_run(pass, &columns);
-	return true;
+	if (pass)
+		pass_run(pass, &columns);
+	return pass;
 }
 
 /* Rows of which some pixels are long strips along the layer: those that are, and those that are not, by programs of their own. */
 static bool run_up_some_along(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view,
-			      struct view_variant variant, struct pass_run *run)
+			      struct up_pixels pixels, const struct pass_run *run)
 {
+	const int row = run->first_row, end_row = row + run->height;
 	for (int first = 0, next; first < run->width; first = next) {
-		const enum view_up_reach reach =
-			view_rows_along(block, view, run->first_row, run->first_row + run->height, first, first + PIECE_COLUMNS);
+		pixels.reach = view_rows_along(block, view, row, end_row, first, first + PIECE_COLUMNS);
 		for (next = first + PIECE_COLUMNS; next < run->width; next += PIECE_COLUMNS)
-			if (view_rows_along(block, view, run->first_row, run->first_row + run->height, next, next + PIECE_COLUMNS) != reach)
+			if (view_rows_along(block, view, row, end_row, next, next + PIECE_COLUMNS) != pixels.reach)
 				break;
-		if (!run_up_columns(stage, block, variant, reach, run, first, next < run->width ? next : run->width))
+		if (!run_up_columns(stage, pixels, run, first, next < run->width ? next : run->width))
 			return false;
 	}
 	return true;
@@ -304,15 +309,19 @@ static bool run_up_some_along(struct view_stage *stage, const struct scene_block
 static bool run_up(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view, struct view_variant variant,
 		   struct pass_run *run, int first, int end)
 {
+	struct up_pixels pixels = {.projection = variant.projection, .packed = variant.packed, .details = (int)block->cloud_field[2]};
 	for (int next; first < end; first = next) {
-		const enum view_up_reach reach = view_rows_reach(block, view, variant.large_sun, first);
+		const enum view_up_reach reach = pixels.reach = view_rows_reach(block, view, first);
+		pixels.disc = view_rows_disc(block, variant.large_sun, first);
 		for (next = first + 1; next < end; next++)
-			if (view_rows_reach(block, view, variant.large_sun, next) != reach)
+			if (view_rows_reach(block, view, next) != reach || view_rows_disc(block, variant.large_sun, next) != pixels.disc)
 				break;
 		run->first_row = first;
 		run->height = next - first;
-		if (!(reach == VIEW_UP_SOME_ALONG ? run_up_some_along(stage, block, view, variant, run)
-						  : run_up_columns(stage, block, variant, reach, run, 0, run->width)))
+		if (pixels.reach == VIEW_UP_NEAR && pixels.disc != VIEW_UP_NO_DISC)
+			pixels.reach = VIEW_UP_FAR; /* no program is worth making for a few rows */
+		if (!(pixels.reach == VIEW_UP_SOME_ALONG ? run_up_some_along(stage, block, view, pixels, run)
+							 : run_up_columns(stage, pixels, run, 0, run->width)))
 			return false;
 	}
 	return true;

@@ -64,26 +64,31 @@ static bool row_is_near(const struct scene_block *block, const struct camera_vie
 	return mu_v > 0.01 && block->camera_position[3] * distance / slant < block->cloud_layer[2] / texels;
 }
 
-/* Does a direction of this sine of elevation see the layer along it? FIELD_ALONG_COSINE in shaders/lib/field.glsl. */
+/* Does a direction of this sine of elevation, or one at the horizon if it is below that, see the layer along it? FIELD_ALONG_COSINE in
+ * shaders/lib/field.glsl. */
 static bool sees_along(const struct scene_block *block, double sine)
 {
+	sine = fmax(sine, view_rows_horizon(block, 0));
 	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0], along_cosine = 0.12;
 	const double b = (radius + h) * sine, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
 	return b + distance < along_cosine * (radius + base);
 }
 
-static bool row_has_disc(const struct scene_block *block, bool large, int row)
+enum view_up_disc view_rows_disc(const struct scene_block *block, bool large_sun, int row)
 {
-	return large || (row >= block->sun_disc_box[1] && row < block->sun_disc_box[1] + block->sun_disc_box[3]);
+	if (large_sun)
+		return VIEW_UP_LARGE_DISC;
+	const bool within = row >= block->sun_disc_box[1] && row < block->sun_disc_box[1] + block->sun_disc_box[3];
+	return within ? VIEW_UP_SMALL_DISC : VIEW_UP_NO_DISC;
 }
 
-enum view_up_reach view_rows_reach(const struct scene_block *block, const struct camera_view *view, bool large_sun, int row)
+enum view_up_reach view_rows_reach(const struct scene_block *block, const struct camera_view *view, int row)
 {
 	double lowest, highest;
 	bound_row(view, row, &lowest, &highest);
 	if (view->projection != PROJECTION_FISHEYE && sees_along(block, lowest))
 		return sees_along(block, fmin(highest, 1)) ? VIEW_UP_ALONG : VIEW_UP_SOME_ALONG;
-	return row_is_near(block, view, row) && !row_has_disc(block, large_sun, row) ? VIEW_UP_NEAR : VIEW_UP_FAR;
+	return row_is_near(block, view, row) ? VIEW_UP_NEAR : VIEW_UP_FAR;
 }
 
 enum view_up_reach view_rows_along(const struct scene_block *block, const struct camera_view *view, int first_row, int end_row,

@@ -14,8 +14,11 @@ double view_rows_horizon(const struct scene_block *block, double height);
 /* Of a row, with a margin of a pixel or two. above: is the camera above a layer? Then rays to the sky do not meet that either. */
 enum view_region view_rows_region(const struct scene_block *block, const struct camera_view *view, bool above, int row);
 
-/* Of a row that looks up at the layer. large_sun: sun_disc.large. */
-enum view_up_reach view_rows_reach(const struct scene_block *block, const struct camera_view *view, bool large_sun, int row);
+/* Of a row that looks up at the layer. */
+enum view_up_reach view_rows_reach(const struct scene_block *block, const struct camera_view *view, int row);
+
+/* large_sun: sun_disc.large. */
+enum view_up_disc view_rows_disc(const struct scene_block *block, bool large_sun, int row);
 
 /* Of a rectangle in rows of VIEW_UP_SOME_ALONG: that, VIEW_UP_ALONG or VIEW_UP_FAR. */
 enum view_up_reach view_rows_along(const struct scene_block *block, const struct camera_view *view, int first_row, int end_row,

@@ -204,12 +204,9 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec3 beside = clear * view_air_beside(along_view, half_angle, ray.distance);
 	vec3 radiance = vec3(near) + beside + vec3(sky) * along_view + met * diffuse +
 	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * lit.light * vec3(light));
-#ifndef FIELD_NEAR
 #if VIEW_LARGE_SUN
 	disc *= exp(-vec3(extinction) * (thickness / ray.mu_v));
 #endif
-	radiance += disc;
-#endif
-	return radiance;
+	return radiance + disc;
 }
 #endif

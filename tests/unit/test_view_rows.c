@@ -94,8 +94,9 @@ static void check_along(const struct looks *looks, int row, int found[VIEW_UP_RE
 	enum { PIECE = 32 };
 	const enum view_up_reach reach = view_rows_reach(&looks->block, &looks->view, row);
 	for (int first = 0; first < WIDTH; first += PIECE) {
-		const enum view_up_reach piece =
-			reach == VIEW_UP_SOME_ALONG ? view_rows_along(&looks->block, &looks->view, row, row + 1, first, first + PIECE) : reach;
+		const enum view_up_reach piece = reach == VIEW_UP_SOME_ALONG
+							 ? view_rows_along(&looks->block, &looks->view, row, row + 1, first, first + PIECE)
+							 : reach;
 		found[piece]++;
 		for (int column = first; column < first + PIECE; column++) {
 			const double cosine = cosine_at_base(&looks->block, sine_at(&looks->view, column + 0.5, row + 0.5));

@@ -66,13 +66,19 @@ vec2 field_detail_place(vec2 p, float density)
 	return (p - vec2(cloud_detail.y, cloud_detail.z) + cloud_field.y * density * vec2(1.0, 0.6)) / cloud_detail.x;
 }
 
+// How many tiles of detail there are, where that is decided when the shader is built: software renderers hold everything in memory across a loop,
+// and run through it once even where it is to run not at all.
+#ifndef FIELD_DETAIL_TILES
+#define FIELD_DETAIL_TILES int(cloud_field.z)
+#endif
+
 // Sum of the tiles of detail at a place p in the drifting field.
 float field_detail_sum(vec2 p, float density, float octaves)
 {
 	vec2 uv = field_detail_place(p, density);
 	float sum = field_detail_at(uv, octaves + 3.0);
 	float weight = 0.5;
-	for (int i = 1; i < int(cloud_field.z); i++) {
+	for (int i = 1; i < FIELD_DETAIL_TILES; i++) {
 		uv *= FIELD_DETAIL_STEP;
 		sum += weight * field_detail_at(uv, octaves + 6.0);
 		weight *= 0.5;

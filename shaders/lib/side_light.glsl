@@ -53,14 +53,9 @@ float side_source(float up, float down)
 	return mix(through, 1.0 - through, down / max(h, 1.0));
 }
 
-// Are all views so flat that no sides are told (side_view.told)? Decided when the shader is built.
-#ifdef FIELD_ALONG
-#if FIELD_ALONG == 1
-#define SIDE_UNTOLD 1
-#endif
-#endif
-#ifndef SIDE_UNTOLD
-#define SIDE_UNTOLD 0
+// Decided when the shader is built: are pixels long strips along the layer, all (1) or some (2)? Below FIELD_ALONG_COSINE (shaders/lib/field.glsl) no sides are told.
+#ifndef FIELD_ALONG
+#define FIELD_ALONG 0
 #endif
 
 // Cloud between two heights where its top is at `top`, m.
@@ -82,7 +77,7 @@ struct side_view {
 // place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical; rugged: by how much sides are met elsewhere, m (field_rugged).
 side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 {
-#if SIDE_UNTOLD
+#if FIELD_ALONG == 1
 	side_view none;
 	none.told = none.thickness = none.above = none.entry = 0.0;
 	none.place = place;
@@ -171,7 +166,7 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	vec4 light = textureLod(side_light, uv, lod);
 	side_lit lit;
 	float side = 0.0;
-#if SIDE_UNTOLD
+#if FIELD_ALONG == 1
 	lit.thickness = lit.sun = thickness;
 	lit.inside = inside;
 #else

@@ -104,9 +104,9 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 	float none = max(1.0 - 0.1 * tops.x, 0.0);
 	from.x -= SIDE_NONE * none;
 	vec4 to = vec4(from.y, from.z, from.w, tops.w - ends.w);
-	// Along a flank both are next to nothing: of that no edge is made.
+	// Along a flank both are next to nothing: of that no edge is made. In an even layer they are as far apart as the slice is high; that stays as it is.
 	vec4 both = abs(from) + abs(to);
-	vec4 little = max(vec4(1.0) - both * (0.25 / SIDE_ALONG), vec4(0.0));
+	vec4 little = max(vec4(1.0) - both / (min(ends - bottoms, vec4(4.0 * SIDE_ALONG)) + 1e-3), vec4(0.0));
 	vec4 filled = (ends - bottoms) * (max(from, vec4(0.0)) + max(to, vec4(0.0))) / (both + SIDE_ALONG * little * little + 1e-3);
 	vec4 begins = ends - mix(filled, ends - bottoms, step(vec4(0.0), from));
 	// Of what is thin at the base both are seen, that and the side behind it.

@@ -167,6 +167,22 @@ static void an_even_layer_is_a_slab(void **)
 	}
 }
 
+/* Nor of layers whose slices are thinner than what edges are made soft over. */
+static void a_thin_even_layer_is_a_slab(void **)
+{
+	for (double deep : {50., 100., 200.})
+		for (double share : {0.2, 0.5, 1.}) {
+			make([=](double, double) { return share * deep; }, 35, 50);
+			glsl::cloud_layer.y = (float)deep;
+			for (double mu : {0.99, 0.5, 0.13}) {
+				const glsl::spread_pass::side_view view =
+					glsl::spread_pass::side_view_at(vec2(1234, 9876), vec2(0.3f, -0.8f), (float)mu, vec2(0));
+				assert_float_equal(view.thickness, share * deep, 0.01);
+				assert_float_equal(view.entry, 0, 0.01);
+			}
+		}
+}
+
 /* Evening out is a mean: the layer stays as thick as it is. */
 static void spreading_keeps_the_mean(void **)
 {
@@ -290,6 +306,7 @@ int main()
 {
 	const CMUnitTest tests[] = {
 		cmocka_unit_test(an_even_layer_is_a_slab),
+		cmocka_unit_test(a_thin_even_layer_is_a_slab),
 		cmocka_unit_test(spreading_keeps_the_mean),
 		cmocka_unit_test(beams_pass_what_brute_force_passes),
 		cmocka_unit_test(views_meet_what_brute_force_meets),

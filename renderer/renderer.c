@@ -73,7 +73,7 @@ static bool warm_up(struct renderer *renderer, double *milliseconds)
 	scene.output.width = scene.output.height = 256;
 	double best = 1e9;
 	for (int i = 0; i < 3; i++) {
-		scene.camera.azimuth_deg = 10.0 * i; /* else the picture would be remembered */
+		scene.camera.azimuth_deg = scene.sun.azimuth_deg + 10.0 * i; /* else the picture would be remembered; with the sun in it */
 		const double begin = clock_milliseconds();
 		if (renderer_render(renderer, &scene, NULL, NULL, &frame) != RENDER_OK)
 			return false;
@@ -302,6 +302,15 @@ static struct scene_light scene_light_of(const struct job *job)
  * than a grey mean, so that it comes out white. As far as the sun lights it. */
 static const double exposure_above_ev = 0.25;
 
+/* The sky that a low sun shines through is far brighter on its side than all round: as much of the beam counts as that does, and as clouds
+ * let through. */
+static double low_sun_share(const struct job *job, const struct scene_light *light)
+{
+	const double elevation = job->scene->sun.elevation_deg, mu = sin(elevation * M_PI / 180);
+	const double passed = mu > 0 ? fmin(light->direct / (mu * light->beam + 1e-9), 1) : 0;
+	return 0.2 * exp(-pow(elevation / 8, 2)) * passed;
+}
+
 /* Automatic exposure from the scene's light alone, never from the picture. What counts is what a picture of the sky shows: diffuse light
  * most of all, sunlight on the ground by a fifth, and a little of the beam itself, which a low sun sends along the ground into the sky that
  * is looked at. A white sheet in that light comes out at 0.6 before tone, and full sunlight as a camera has it at 1/100 s, f/16 and ISO
@@ -312,7 +321,7 @@ static double exposure_of(const struct job *job)
 		return job->scene->output.exposure_ev;
 	const bool above = scene_has_clouds(job->scene) && job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
 	const struct scene_light light = scene_light_of(job);
-	const double lux = fmax(0.65 * light.diffuse + 0.21 * light.direct + 0.08 * light.beam, 1e-2);
+	const double lux = fmax(0.65 * light.diffuse + 0.21 * light.direct + (0.08 + low_sun_share(job, &light)) * light.beam, 1e-2);
 	return log2(0.6 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) +
 	       (above ? exposure_above_ev * light.direct / (light.direct + light.diffuse + 1e-9) : 0);
 }

@@ -34,7 +34,7 @@ static void expose_film(float rgb[3])
 	const float share = square * (0.85f + 0.0033f * red) / ((square + 9) * (1 + 0.005f * red));
 	for (int c = 0; c < 3; c++) {
 		const float lack = fmaxf(1 - rgb[c] / fmaxf(red, 1e-9f), 0);
-		rgb[c] = filmic(rgb[c] + fog * red) * (1 - share * lack * (0.3f + 0.7f * lack * lack));
+		rgb[c] = filmic(rgb[c] + fog * red) * (1 - share * lack * (0.45f + 0.55f * lack * lack));
 	}
 }
 

@@ -3,6 +3,7 @@
 #include "renderer/log.h"
 #include "renderer/stages/colour.h"
 #include "renderer/stages/ground.h"
+#include "renderer/stages/view_rows.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -265,100 +266,63 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
-/* Sine of the (negative) elevation of the horizon of a sphere `height` above the ground, seen from the camera; 1 from inside it. */
-static double horizon_sine(const struct scene_block *block, double height)
+/* Columns that are looked at together whether they are long strips. */
+enum { PIECE_COLUMNS = 32 };
+
+/* Pixels that look up at the layer and have this in common; where they lie, and of which picture, is laid down in a run. */
+struct up_pixels {
+	enum projection projection;
+	bool packed;
+	enum view_up_reach reach;
+	enum view_up_disc disc;
+	int details;
+};
+
+static bool run_up_columns(struct view_stage *stage, struct up_pixels pixels, const struct pass_run *run, int first, int end)
 {
-	const double radius = 6371000.0, h = block->camera_position[2];
-	return h < height ? 1 : -sqrt((h - height) * (2 * radius + h + height)) / (radius + h);
+	const struct pass *pass = view_up_pass(&stage->up, pixels.projection, pixels.packed, pixels.reach, pixels.disc, pixels.details);
+	struct pass_run columns = *run;
+	columns.first_column = first;
+	columns.width = end - first;
+	if (pass)
+		pass_run(pass, &columns);
+	return pass;
 }
 
-/* Least and greatest sine of the elevation along a row of pixels. That of a perspective rises and falls at most once along a row, so that
- * its ends, its middle and points between bound it, but for the bulge between those, the square of their distance. */
-static void bound_row(const struct camera_view *view, int row, double *lowest, double *highest)
+/* Rows of which some pixels are long strips along the layer: those that are, and those that are not, by programs of their own. */
+static bool run_up_some_along(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view,
+			      struct up_pixels pixels, const struct pass_run *run)
 {
-	enum { PROBES = 16 };
-	const double bulge = view->projection == PROJECTION_PERSPECTIVE ? pow(view->tangent[0] / PROBES, 2) : 0;
-	*lowest = 1;
-	*highest = -1;
-	for (int i = 0; i <= PROBES; i++) {
-		const double at[2] = {(double)view->width * i / PROBES, row + 0.5};
-		double direction[3];
-		camera_direction(view, at, direction);
-		*lowest = fmin(*lowest, direction[2] - bulge);
-		*highest = fmax(*highest, direction[2] + bulge);
+	const int row = run->first_row, end_row = row + run->height;
+	for (int first = 0, next; first < run->width; first = next) {
+		pixels.reach = view_rows_along(block, view, row, end_row, first, first + PIECE_COLUMNS);
+		for (next = first + PIECE_COLUMNS; next < run->width; next += PIECE_COLUMNS)
+			if (view_rows_along(block, view, row, end_row, next, next + PIECE_COLUMNS) != pixels.reach)
+				break;
+		if (!run_up_columns(stage, pixels, run, first, next < run->width ? next : run->width))
+			return false;
 	}
-}
-
-/* What the rays of a row of pixels have in common, with a margin of two pixels. */
-static enum view_region region_of_row(const struct scene_block *block, const struct camera_view *view, enum view_side side, int row)
-{
-	const double pixel = camera_pixel_angle(view), ground = horizon_sine(block, 0);
-	/* From above, rays that miss the ground may still graze the layer. */
-	const double sky = side == VIEW_ABOVE ? horizon_sine(block, block->cloud_layer[0] + block->cloud_layer[1]) : ground;
-	double lowest, highest;
-	if (view->projection == PROJECTION_FISHEYE)
-		return sky < -1e-6 ? VIEW_SKY : VIEW_MIXED; /* it ends at elevation 0 */
-	bound_row(view, row, &lowest, &highest);
-	if (lowest > sky + 2 * pixel + 1e-6)
-		return VIEW_SKY;
-	return highest < ground - 2 * pixel - 1e-6 ? VIEW_GROUND : VIEW_MIXED;
-}
-
-/* Is no pixel of a row, all above the horizon, larger than half a texel of the field or a texel of the thickness evened out? */
-static bool row_is_near(const struct scene_block *block, const struct camera_view *view, int row)
-{
-	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0];
-	const double texels = fmax(2 * block->cloud_threshold[3], 256);
-	double lowest, highest;
-	bound_row(view, row, &lowest, &highest);
-	const double b = (radius + h) * lowest, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
-	const double mu_v = ((radius + h) * lowest + distance) / (radius + base);
-	/* As camera_footprint in shaders/lib/camera.glsl. */
-	const double slant = view->projection == PROJECTION_FISHEYE ? mu_v : sqrt(mu_v);
-	/* And none so far away that the tile is warped: FIELD_WARP_BEGIN in shaders/lib/field_warp.glsl. */
-	const double across = distance * sqrt(fmax(0, 1 - lowest * lowest));
-	if (block->cloud_warp[3] > 0 && across > 0.5 * block->cloud_layer[2])
-		return false;
-	return mu_v > 0.01 && block->camera_position[3] * distance / slant < block->cloud_layer[2] / texels;
-}
-
-/* Does a direction of this sine of elevation see the layer along it? FIELD_ALONG_COSINE in shaders/lib/field.glsl. */
-static bool sees_along(const struct scene_block *block, double sine)
-{
-	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0], along_cosine = 0.12;
-	const double b = (radius + h) * sine, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
-	return b + distance < along_cosine * (radius + base);
-}
-
-static bool row_has_disc(const struct scene_block *block, bool large, int row)
-{
-	return large || (row >= block->sun_disc_box[1] && row < block->sun_disc_box[1] + block->sun_disc_box[3]);
-}
-
-static enum view_up_reach reach_of(const struct scene_block *block, const struct camera_view *view, struct view_variant variant, int row)
-{
-	double lowest, highest;
-	bound_row(view, row, &lowest, &highest);
-	if (view->projection != PROJECTION_FISHEYE && sees_along(block, lowest))
-		return sees_along(block, fmin(highest, 1)) ? VIEW_UP_ALONG : VIEW_UP_SOME_ALONG;
-	return row_is_near(block, view, row) && !row_has_disc(block, variant.large_sun, row) ? VIEW_UP_NEAR : VIEW_UP_FAR;
+	return true;
 }
 
 /* Rows [first, end) up at the layer. */
 static bool run_up(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view, struct view_variant variant,
 		   struct pass_run *run, int first, int end)
 {
+	struct up_pixels pixels = {.projection = variant.projection, .packed = variant.packed, .details = (int)block->cloud_field[2]};
 	for (int next; first < end; first = next) {
-		const enum view_up_reach reach = reach_of(block, view, variant, first);
+		const enum view_up_reach reach = pixels.reach = view_rows_reach(block, view, first);
+		pixels.disc = view_rows_disc(block, variant.large_sun, first);
 		for (next = first + 1; next < end; next++)
-			if (reach_of(block, view, variant, next) != reach)
+			if (view_rows_reach(block, view, next) != reach || view_rows_disc(block, variant.large_sun, next) != pixels.disc)
 				break;
-		const struct pass *pass = view_up_pass(&stage->up, variant.projection, variant.packed, reach, variant.large_sun);
-		if (!pass)
-			return false;
 		run->first_row = first;
 		run->height = next - first;
-		pass_run(pass, run);
+		if (pixels.reach == VIEW_UP_NEAR && pixels.disc != VIEW_UP_NO_DISC)
+			pixels.reach = VIEW_UP_FAR; /* no program is worth making for a few rows */
+		if (!(pixels.reach == VIEW_UP_SOME_ALONG ? run_up_some_along(stage, block, view, pixels, run)
+							 : run_up_columns(stage, pixels, run, 0, run->width)))
+			return false;
 	}
 	return true;
 }
@@ -369,9 +333,9 @@ static bool run_regions(struct view_stage *stage, const struct stage_context *co
 			struct view_variant variant, struct pass_run *run, struct pass_run *up)
 {
 	while (first < last) {
-		variant.region = region_of_row(&context->block, view, variant.side, first);
+		variant.region = view_rows_region(&context->block, view, variant.side == VIEW_ABOVE, first);
 		int end = first + 1;
-		while (end < last && region_of_row(&context->block, view, variant.side, end) == variant.region)
+		while (end < last && view_rows_region(&context->block, view, variant.side == VIEW_ABOVE, end) == variant.region)
 			end++;
 		if (up && variant.region == VIEW_SKY) {
 			if (!run_up(stage, &context->block, view, variant, up, first, end))
@@ -413,9 +377,9 @@ static bool see_rows(struct view_stage *stage, struct stage_context *context, co
 {
 	bool ok = true;
 	for (int end; ok && first < last; first = end) {
-		const bool sky = !all && region_of_row(&context->block, view, VIEW_ABOVE, first) == VIEW_SKY;
+		const bool sky = !all && view_rows_region(&context->block, view, true, first) == VIEW_SKY;
 		for (end = first + 1; end < last && !all; end++)
-			if (sky != (region_of_row(&context->block, view, VIEW_ABOVE, end) == VIEW_SKY))
+			if (sky != (view_rows_region(&context->block, view, true, end) == VIEW_SKY))
 				break;
 		end = all ? last : end;
 		ok = sky || height_view_run(&stage->height, scene, view, field, first, end, seen);
@@ -622,7 +586,7 @@ bool view_stage_run(struct view_stage *stage, struct stage_context *context, con
 	struct view_inputs with_seen = *inputs;
 	with_seen.seen = &seen;
 	const struct view_samples samples = side_of(scene, inputs) == VIEW_BELOW ? view_samples_of(scene) : (struct view_samples){1, 1};
-	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, horizon_sine(&context->block, 0), inputs->sun_cover) &&
+	bool ok = disc_buffer_fill(&stage->disc, &context->block, scene, view_rows_horizon(&context->block, 0), inputs->sun_cover) &&
 		  (side_of(scene, inputs) != VIEW_ABOVE || see_layer(stage, context, scene, inputs, alone, &seen));
 	for (int i = 0; ok && i < missing_count;) {
 		const int left = missing_count - i, group = left < VIEW_OUTPUTS ? left : VIEW_OUTPUTS;

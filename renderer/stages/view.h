@@ -7,6 +7,7 @@
 
 #include "renderer/stages/disc.h"
 #include "renderer/stages/height_view.h"
+#include "renderer/stages/view_rows.h"
 #include "renderer/stages/view_samples.h"
 #include "renderer/stages/view_up.h"
 
@@ -15,9 +16,6 @@ enum { VIEW_OUTPUTS = 4 };
 
 /* Where the camera is. */
 enum view_side { VIEW_CLEAR, VIEW_BELOW, VIEW_ABOVE, VIEW_SIDES };
-
-/* Rows of the picture: rays of either kind, all to the ground, none to the ground. The numbers stand in shaders/lib/view.glsl. */
-enum view_region { VIEW_MIXED, VIEW_GROUND, VIEW_SKY, VIEW_REGIONS };
 
 /* What the ground is close by. The numbers stand in shaders/lib/ground.glsl. */
 enum view_ground { VIEW_BARE, VIEW_GROWN, VIEW_SEA, VIEW_ICE, VIEW_GROUNDS };

@@ -8,7 +8,7 @@
 /* Largest angle between rays, rad, and what one of them covers at most: with these the light of broken clouds is right within a percent
  * (tests/unit/test_renderer_panoramas.c). Pixels that are hardly smaller want two rays a side all the same, lest they show single places.
  */
-static const double ray_angle = 0.0062, ray_footprint = 0.002, fine_angle = 0.0041;
+static const double ray_angle = 0.0062, ray_footprint = 0.002, fine_angle = 0.0035;
 /* Pictures are made no finer than of so many rays. */
 static const double rays_max = 1 << 22;
 

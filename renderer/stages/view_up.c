@@ -22,14 +22,16 @@ static const struct pass_desc light_desc = {
 	.file = "shaders/passes/view_up_light.glsl", .defines = DEFINES, .outputs = 1, .samplers = {"slab_slices", "slab_table"}};
 
 const struct pass *view_up_pass(struct view_up_stage *stage, enum projection projection, bool packed, enum view_up_reach reach,
-				bool large_sun)
+				enum view_up_disc disc, int details)
 {
 	static const char *const reaches[VIEW_UP_REACHES] = {"", "#define FIELD_NEAR 1\n", "#define FIELD_ALONG 1\n",
 							     "#define FIELD_ALONG 2\n"};
-	struct pass **pass = &stage->look[projection][packed][reach][large_sun];
+	struct pass **pass = &stage->look[projection][packed][reach][disc][details - 1];
 	char defines[512];
-	snprintf(defines, sizeof defines, "%s%s%s#define VIEW_PROJECTION %d\n#define VIEW_LARGE_SUN %d\n", DEFINES,
-		 packed ? "#define FIELD_PACKED 1\n" : "", reaches[reach], projection, large_sun);
+	snprintf(defines, sizeof defines,
+		 "%s%s%s#define VIEW_PROJECTION %d\n#define UP_DISC %d\n#define VIEW_LARGE_SUN %d\n#define FIELD_DETAIL_TILES %d\n",
+		 DEFINES, packed ? "#define FIELD_PACKED 1\n" : "", reaches[reach], projection, disc != VIEW_UP_NO_DISC,
+		 disc == VIEW_UP_LARGE_DISC, details);
 	if (!*pass)
 		*pass = pass_create(&stage->compiler, &(struct pass_desc){.file = "shaders/passes/view_up.glsl",
 									  .defines = defines,
@@ -47,9 +49,9 @@ bool view_up_init(struct view_up_stage *stage, const struct pass_compiler *compi
 		  (stage->light = pass_create(compiler, &light_desc));
 	for (int i = 0; ok && i < VIEW_UP_AIR_TABLES; i++)
 		ok = texture_init(&stage->air_tables[i], AIR_WIDTH, AIR_HEIGHT, TEXTURE_RGBA32F, 0);
-	ok = ok && view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_FAR, false) &&
-	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_ALONG, false) &&
-	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_SOME_ALONG, false);
+	ok = ok && view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_FAR, false, 1) &&
+	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_ALONG, VIEW_UP_NO_DISC, 1) &&
+	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_SOME_ALONG, VIEW_UP_NO_DISC, 1);
 	if (!ok)
 		view_up_finish(stage);
 	return ok;
@@ -57,7 +59,7 @@ bool view_up_init(struct view_up_stage *stage, const struct pass_compiler *compi
 
 void view_up_finish(struct view_up_stage *stage)
 {
-	struct pass **look = &stage->look[0][0][0][0];
+	struct pass **look = &stage->look[0][0][0][0][0];
 	for (size_t i = 0; i < sizeof stage->look / sizeof *look; i++)
 		pass_destroy(look[i]);
 	for (int i = 0; i < VIEW_UP_AIR_TABLES; i++)

@@ -9,17 +9,21 @@
 
 #include "renderer/stages/radiosity.h"
 
-enum { VIEW_UP_AIR_TABLES = 3 };
+enum { VIEW_UP_AIR_TABLES = 3, VIEW_UP_DETAILS = 3 };
 
 /* How far away the layer is in some rows of pixels: anywhere; none is larger than half a texel of the field, nor shows the sun's disc; so
  * low that each, or some, are long strips (FIELD_ALONG_COSINE in shaders/lib/field.glsl). */
 enum view_up_reach { VIEW_UP_FAR, VIEW_UP_NEAR, VIEW_UP_ALONG, VIEW_UP_SOME_ALONG, VIEW_UP_REACHES };
 
+/* What rows of pixels show of the sun's disc (shaders/lib/sun_disc.glsl): nothing, one whose light was spread over pixels beforehand, one
+ * that is large. */
+enum view_up_disc { VIEW_UP_NO_DISC, VIEW_UP_SMALL_DISC, VIEW_UP_LARGE_DISC, VIEW_UP_DISCS };
+
 struct view_up_stage {
 	struct pass_compiler compiler; /* shader_dir must outlive the stage */
 	struct pass *air, *first, *light;
 	/* By view_up_pass's arguments; all but those that most pictures need are made when wanted. */
-	struct pass *look[PROJECTION_COUNT][2][VIEW_UP_REACHES][2];
+	struct pass *look[PROJECTION_COUNT][2][VIEW_UP_REACHES][VIEW_UP_DISCS][VIEW_UP_DETAILS];
 	struct texture air_tables[VIEW_UP_AIR_TABLES]; /* of the frame in work */
 	struct texture received;                       /* view of radiosity_light.cloud_received */
 };
@@ -40,9 +44,9 @@ void view_up_finish(struct view_up_stage *stage);
 bool view_up_prepare(struct view_up_stage *stage, struct stage_context *context, const struct scene *scene,
 		     const struct view_up_inputs *inputs, struct pass_run *run);
 
-/* The program to run over pixels above the horizon, with the samplers that view_up_prepare left in its run. large_sun: sun_disc.large. NULL
- * after log lines when it does not compile. */
+/* The program to run over pixels above the horizon, with the samplers that view_up_prepare left in its run. details: tiles of the field's
+ * detail, 1..VIEW_UP_DETAILS. NULL after log lines when it does not compile. */
 const struct pass *view_up_pass(struct view_up_stage *stage, enum projection projection, bool packed, enum view_up_reach reach,
-				bool large_sun);
+				enum view_up_disc disc, int details);
 
 #endif

@@ -66,19 +66,50 @@ vec2 field_detail_place(vec2 p, float density)
 	return (p - vec2(cloud_detail.y, cloud_detail.z) + cloud_field.y * density * vec2(1.0, 0.6)) / cloud_detail.x;
 }
 
+// How many tiles of detail there are, where that is decided when the shader is built: software renderers hold everything in memory across a loop,
+// and run through it once even where it is to run not at all.
+#ifndef FIELD_DETAIL_TILES
+#define FIELD_DETAIL_TILES int(cloud_field.z)
+#endif
+
 // Sum of the tiles of detail at a place p in the drifting field.
 float field_detail_sum(vec2 p, float density, float octaves)
 {
 	vec2 uv = field_detail_place(p, density);
 	float sum = field_detail_at(uv, octaves + 3.0);
 	float weight = 0.5;
-	for (int i = 1; i < int(cloud_field.z); i++) {
+	for (int i = 1; i < FIELD_DETAIL_TILES; i++) {
 		uv *= FIELD_DETAIL_STEP;
 		sum += weight * field_detail_at(uv, octaves + 6.0);
 		weight *= 0.5;
 		octaves += 3.0;
 	}
 	return sum;
+}
+
+// Sides of clouds billow on scales that neither the field's texels nor means along a slanted view show: by how much they are met elsewhere, m. The detail serves once more, so large that
+// its octaves begin at 160 m, in two places a whole number of texels apart; on thick layers it is the rougher. Pixels are hardly larger than its texels wherever sides are told.
+const float FIELD_RUGGED_TILE = 1e4;   // m, about: a whole number of them is a tile
+const float FIELD_RUGGED_APART = 0.40625;
+const float FIELD_RUGGED_SHARE = 0.1;  // of the layer's thickness
+const float FIELD_RUGGED_MOST = 45.0;  // m
+
+vec2 field_rugged(vec2 place)
+{
+	vec2 uv = field_place(place) * (max(floor(cloud_layer.z / FIELD_RUGGED_TILE + 0.5), 1.0) / cloud_layer.z);
+#ifdef FIELD_PACKED
+	float size = float(FIELD_DETAIL_SIZE);
+	vec2 p = uv * size - 0.5;
+	vec2 base = floor(p);
+	vec2 f = p - base;
+	base = (base + 0.5) / size;
+	vec4 a = packed_texel(field_detail, fract(base), FIELD_DETAIL_SIZE, size);
+	vec4 b = packed_texel(field_detail, fract(base + FIELD_RUGGED_APART), FIELD_DETAIL_SIZE, size);
+	vec2 shift = mix(mix(vec2(a.x, b.x), vec2(a.y, b.y), f.x), mix(vec2(a.z, b.z), vec2(a.w, b.w), f.x), f.y);
+#else
+	vec2 shift = vec2(textureLod(field_detail, uv, 0.0).x, textureLod(field_detail, uv + FIELD_RUGGED_APART, 0.0).x);
+#endif
+	return min(FIELD_RUGGED_SHARE * cloud_layer.y, FIELD_RUGGED_MOST) * shift;
 }
 
 // The field alone, where pixels are larger than texels. p: place in the drifting field.

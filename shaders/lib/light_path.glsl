@@ -51,6 +51,7 @@ struct light_path {
 	float pick_passes; // share of the sun's light that was expected there
 	int pick_kind;
 	bool pick_straight;
+	float pick_bends;
 	vec3 ratio; // density with which each band would have drawn the path, over the hero's
 	vec3 share; // per band, what the densities do not hold: reflectances, the air before the first event
 	int hero;
@@ -58,6 +59,7 @@ struct light_path {
 	int turns;     // scatterings beyond the forward peak so far
 	bool first;    // nothing has been met yet
 	bool straight; // nothing but forward scatterings so far
+	float bends;   // sum of those, as path_bend counts them
 	bool lifted;   // the last thing met was the ground
 	int grounded;  // 0 never, 1 after cloud, 2 before any
 	uint random;
@@ -69,11 +71,13 @@ struct light_path {
 	float next;    // m, where it is scattered next
 	float weight;  // of the way up to there, as path_sun_weight counts it
 	float reach;   // m, up to the end of the layer
+	float behind;  // length over which ways that bend may go on there, over the reach
 	float whole;   // of it as it is weighed
-	int cloudy;    // parts of that way that are expected to lie in cloud, as a bit set
+	ivec2 cloudy;  // parts of that way that are expected to lie in cloud, as a bit set; and near cloud
 	vec2 looked;   // scales of the shares of forward scatterings that are looked for in those parts and elsewhere
 	float mean;    // number of forward scatterings that is looked for
 	int left;      // scatterings to come
+	vec2 weighed;  // for ways of forward scatterings alone: the bend where the search began, and all bends of the way so far
 	ivec2 chain;
 	vec2 turn;     // cosine and sine of the angle by which the chain is turned about the sun
 };
@@ -163,6 +167,15 @@ vec3 path_turned(vec3 direction, float cosine, float sine, float around)
 	return normalize(direction * cosine + (x * cos(around) + y * sin(around)) * sine);
 }
 
+// Ways of forward scatterings alone are found from each of their scatterings, which sees the others drawn and looks at its own part of the peak. The balance heuristic would weigh by the
+// inverse of the peak there; this stands for it, up to a factor, which is all that weights need to add up to one. half_sine: of half the angle.
+const float PATH_BEND_LEAST = 0.002;
+
+float path_bend(float half_sine)
+{
+	return half_sine * half_sine + PATH_BEND_LEAST * PATH_BEND_LEAST;
+}
+
 // Scatters: a new direction, drawn from the hero's phase function.
 void path_scatter(INOUT(light_path) path, float share, float around)
 {
@@ -173,6 +186,7 @@ void path_scatter(INOUT(light_path) path, float share, float around)
 	bool forward = half_angle.x < FORWARD_PEAK_SINE;
 	path.turns += forward ? 0 : 1;
 	path.straight = path.straight && forward;
+	path.bends += path_bend(half_angle.x);
 	path.direction = path_turned(path.direction, 1.0 - 2.0 * half_angle.x * half_angle.x, 2.0 * half_angle.x * half_angle.y, 2.0 * PI * around);
 }
 

@@ -3,7 +3,8 @@
 // Droplets scatter half of all light by less than 5 degrees. Looking from every scattering straight at the sun would find, once in a thousand times, one that scatters into
 // the middle of that peak, and leave a bright speck. So light is sorted by its last scattering beyond the peak, seen from the camera: from there on it goes to the sun by
 // forward scatterings alone, and that rest is drawn from the sun's side, where its directions come of the peak itself. What is left to evaluate is the phase function
-// outside the peak. Only paths that met nothing but forward scatterings (order 0) look at the sun through the peak.
+// outside the peak. Paths that met nothing but forward scatterings (order 0) have to look at the sun through the peak: from each of these, the rest drawn from the sun's side all the same,
+// and weighed so that the one that bends the way most counts most, which is hardly ever in the middle of the peak (path_bend).
 //
 // Number and places of the forward scatterings are drawn for the cloud that is expected towards the sun, those places a Poisson process on the way; what cloud there
 // really is decides about their weight, and ratio tracking (Novak, Selle and Jarosz 2014, "Residual Ratio Tracking") about what the way lets through beside.
@@ -18,11 +19,13 @@ const int PATH_CHAIN_ROWS = 64;
 // The way to the sun is looked at in so many parts, short ones first.
 const int PATH_PARTS = 16;
 const float PATH_PARTS_BEND = 12.0;
-// Where no cloud is expected there may be some: share of the forward scatterings looked for beside cloud, and away from it. Every one of them that meets no cloud brings nothing, so that
-// few are worth looking for.
-const float PATH_BESIDE = 0.3;
+// Where no cloud is expected there may be some: share of the forward scatterings looked for near cloud, as far as ways stray from the straight one, and away from it. Every one of them that
+// meets no cloud brings nothing, so that few are worth looking for; but what is found where few are looked for outshines the rest of the picture.
+const float PATH_NEAR = 0.3;
 const float PATH_AWAY = 0.015;
 const float PATH_IN_VAIN = 1.5;
+const float PATH_BEND = 0.1; // rad, by which ways bend at most; and mostly
+const float PATH_STRAY = 0.05;
 const float PATH_SURE = 4.0; // optical thickness
 const float PATH_MOST = 6.0;
 
@@ -47,13 +50,25 @@ bool path_part_cloudy(int cloudy, int part)
 bool path_part_sure(light_path path, int part)
 {
 	float size = (path_part_start(part + 1) - path_part_start(part)) * path.reach;
-	return path_part_cloudy(path.cloudy, part) && size * extinction.y < PATH_SURE;
+	return path_part_cloudy(path.cloudy.x, part) && size * extinction.y < PATH_SURE;
 }
 
 // Share of the forward scatterings in cloud that are looked for in a part.
-float path_part_share(int cloudy, vec2 looked, int part)
+float path_part_share(ivec2 cloudy, vec2 looked, int part)
 {
-	return path_part_cloudy(cloudy, part) ? looked.x : looked.y * ((((cloudy << 1) >> part) & 5) != 0 ? PATH_BESIDE : PATH_AWAY);
+	return path_part_cloudy(cloudy.x, part) ? looked.x : looked.y * (path_part_cloudy(cloudy.y, part) ? PATH_NEAR : PATH_AWAY);
+}
+
+// The same behind the last part: ways that bend down leave the layer later than the straight one. It falls as an exponential, of a length in parts of the whole way.
+float path_behind_length(float mu_sun)
+{
+	return clamp(PATH_BEND * inversesqrt(max(mu_sun * mu_sun, 1e-4)), 0.05, 1.0);
+}
+
+float path_share_at(light_path path, float way)
+{
+	float behind = path_part_share(path.cloudy, path.looked, PATH_PARTS) * exp(-max(way - 1.0, 0.0) / path.behind);
+	return way < 1.0 ? path_part_share(path.cloudy, path.looked, path_part_at(way)) : behind;
 }
 
 // Draws where the path is scattered next: x of a uniform density over the rest of the ways as they are weighed.
@@ -70,13 +85,15 @@ void path_sun_draw_next(INOUT(light_path) path)
 		at = at < 0.0 && rest <= size * part_share ? from + rest / part_share : at;
 		rest -= size * part_share;
 	}
-	path.next = path.left == 0 ? 1e9 : (at < 0.0 ? 1.0 : at) * path.reach;
+	float behind = path_part_share(path.cloudy, path.looked, PATH_PARTS) * path.behind;
+	at = at < 0.0 ? 1.0 - path.behind * log(max(1.0 - rest / max(behind, 1e-9), 1e-6)) : at;
+	path.next = path.left == 0 ? 1e9 : at * path.reach;
 }
 
-// The whole way, weighed, over its length.
-float path_sun_whole(int cloudy, vec2 looked)
+// The whole way and what may lie behind it, weighed, over its length.
+float path_sun_whole(ivec2 cloudy, vec2 looked, float behind)
 {
-	float sum = 0.0;
+	float sum = path_part_share(cloudy, looked, PATH_PARTS) * behind;
 	for (int i = 0; i < PATH_PARTS; i++)
 		sum += (path_part_start(i + 1) - path_part_start(i)) * path_part_share(cloudy, looked, i);
 	return sum;
@@ -111,19 +128,23 @@ float path_sun_reach(float height, float mu_sun)
 	return max(mu < 0.0 ? (cloud_layer.x - height) / mu : (cloud_layer.x + cloud_layer.y - height) / mu, 0.01);
 }
 
-// Looks at the straight way from a place to the sun: which parts of it lie in cloud, as far as light comes through. furthest: m of cloud.
-int path_sun_look(vec3 place, float height, float mu_sun, float reach, float furthest)
+// Looks at the straight way from a place to the sun: which parts of it lie in cloud (x), as far as light comes through, and which near it (y), the one behind the last among them.
+// furthest: m of cloud.
+ivec2 path_sun_look(vec3 place, float height, float mu_sun, float reach, float furthest)
 {
 	int cloudy = 0;
+	int near = 0;
 	float passed = 0.0;
 	for (int i = 0; i < PATH_PARTS; i++) {
 		float t = 0.5 * (path_part_start(i) + path_part_start(i + 1)) * reach;
 		float over = height - cloud_layer.x + mu_sun * t;
-		bool inside = passed < furthest && over >= 0.0 && over < path_top(place + vec3(sun_direction) * t);
+		float top = path_top(place + vec3(sun_direction) * t);
+		bool inside = passed < furthest && over >= 0.0 && over < top;
 		cloudy |= inside ? 1 << i : 0;
+		near |= top > 0.0 && over < top + PATH_STRAY * t ? 1 << i : 0;
 		passed += inside ? (path_part_start(i + 1) - path_part_start(i)) * reach : 0.0;
 	}
-	return cloudy;
+	return ivec2(cloudy, near | (cloudy << 1) | (cloudy >> 1));
 }
 
 // Begins to look for the sun. place: where the straight way to the sun enters the layer; height above ground, cosine of the sun there; ratio: densities of
@@ -134,14 +155,16 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 	vec3 peak = vec3(extinction) - vec3(extinction_modified);
 	float hero_peak = path_of_hero(peak, path.hero);
 	path.reach = path_sun_reach(height, mu_sun);
-	path.cloudy = path_sun_look(place, height, mu_sun, path.reach, PATH_MOST / hero_peak);
+	path.behind = path_behind_length(mu_sun);
+	// What is looked for must not depend on the hero: the bands' densities would be of different ways.
+	path.cloudy = path_sun_look(place, height, mu_sun, path.reach, PATH_MOST / peak.y);
 	path.arc = 0.0;
 	path.weight = 0.0;
-	float expected = path_sun_whole(path.cloudy, vec2(1.0, 0.0)) * path.reach;
+	float expected = path_sun_whole(path.cloudy, vec2(1.0, 0.0), path.behind) * path.reach;
 	// Long ways to a low sun lie in the open, or lead through so much cloud that light takes another: no more scatterings are looked for there than light makes.
-	float in_vain = path_sun_whole(path.cloudy, vec2(0.0, 1.0)) * path.reach;
-	path.looked = min(vec2(1.0), vec2(2.0 * PATH_MOST, PATH_IN_VAIN) / max(hero_peak * vec2(expected, in_vain), vec2(1e-6)));
-	path.whole = path_sun_whole(path.cloudy, path.looked);
+	float in_vain = path_sun_whole(path.cloudy, vec2(0.0, 1.0), path.behind) * path.reach;
+	path.looked = min(vec2(1.0), vec2(2.0 * PATH_MOST, PATH_IN_VAIN) / max(peak.y * vec2(expected, in_vain), vec2(1e-6)));
+	path.whole = path_sun_whole(path.cloudy, path.looked, path.behind);
 
 	float patience = clamp(worth * exp(-path_of_hero(vec3(extinction_modified), path.hero) * expected * min(10.0 * abs(mu_sun), 1.0)), 0.03, 1.0);
 	bool looks = path_random(path) < patience;
@@ -178,7 +201,7 @@ vec3 path_sun_begin(INOUT(light_path) path, vec3 place, float height, float mu_s
 // A free path of the search ends inside the cloud or outside of it. false when nothing is left.
 bool path_sun_collides(INOUT(light_path) path, bool inside, float largest)
 {
-	bool expected = path_part_sure(path, path_part_at(path.arc / path.reach));
+	bool expected = path.arc < path.reach && path_part_sure(path, path_part_at(path.arc / path.reach));
 	vec3 factor = vec3(1.0) - vec3(extinction) * ((inside ? 1.0 : 0.0) - (expected ? 1.0 : 0.0)) / largest;
 	// Where cloud is unexpected hardly anything is left.
 	float most = clamp(max(factor.x, max(factor.y, factor.z)), 0.0, 1.0);
@@ -193,15 +216,17 @@ vec3 path_sun_arrives(light_path path)
 	float expected = 0.0;
 	for (int i = 0; i < PATH_PARTS; i++)
 		expected += path_part_sure(path, i) ? clamp(way - path_part_start(i), 0.0, path_part_start(i + 1) - path_part_start(i)) : 0.0;
-	return path.left == 0 ? path.sun * exp(vec3(path.mean) - vec3(extinction) * (expected * path.reach)) : vec3(0.0);
+	return path.left == 0 ? path.sun * (path.weighed.x / path.weighed.y) * exp(vec3(path.mean) - vec3(extinction) * (expected * path.reach)) : vec3(0.0);
 }
 
 // The next forward scattering, in cloud.
 void path_sun_turns(INOUT(light_path) path)
 {
-	path.sun /= path_part_share(path.cloudy, path.looked, path_part_at(path.arc / path.reach));
+	path.sun /= path_share_at(path, path.arc / path.reach);
 	path.left = max(path.left - 1, 0);
+	vec3 before = path.direction;
 	path.direction = path_sun_direction(path, path_sun_texel(path));
+	path.weighed.y += path.weighed.x < 1.0 ? path_bend(0.5 * length(path.direction - before)) : 0.0;
 	path_sun_draw_next(path);
 	path.mode = PATH_SUN;
 }

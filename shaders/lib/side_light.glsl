@@ -22,9 +22,17 @@ const vec4 SIDE_HEIGHTS = vec4(0.0, 0.12, 0.34, 0.72);
 // Octaves by which texels of the tops are smaller than the way through the layer, at the upper slices: about half of what lies between two of them. Larger texels lose the tops.
 const float SIDE_SHARP = 2.5;
 // Where there is no cloud the top is as far below the base, m.
-const float SIDE_NONE = 12.0;
+const float SIDE_NONE = 60.0;
 // Of several places that are seen at once, deviation of their heights above which detail of none is told, m.
 const float SIDE_CLEAR = 40.0;
+// Droplets at the rim of a cloud are fewer than inside, as air that is mixed in dries them: over a way of this share of the layer's thickness.
+const float SIDE_RIM = 0.15;
+// What is left of the light behind counts so much as something at the base.
+const float SIDE_BESIDE = 0.2;
+// Within so much of the surface at both ends a slice counts as little filled, m.
+const float SIDE_ALONG = 12.0;
+// Detail is of the thickness, which hardly varies in the middle of a cloud; on its sides, which are the field's edges elsewhere, it is so much more.
+const float SIDE_ROUGHER = 2.5;
 // Views along the layer see it as under this slope, m a metre of height; slices would stand beside each other.
 const float SIDE_SLOPE_MAX = 4.0;
 
@@ -45,6 +53,11 @@ float side_source(float up, float down)
 	return mix(through, 1.0 - through, down / max(h, 1.0));
 }
 
+// Decided when the shader is built: are pixels long strips along the layer, all (1) or some (2)? Below FIELD_ALONG_COSINE (shaders/lib/field.glsl) no sides are told.
+#ifndef FIELD_ALONG
+#define FIELD_ALONG 0
+#endif
+
 // Cloud between two heights where its top is at `top`, m.
 float side_filled(float top, float from, float to)
 {
@@ -61,9 +74,16 @@ struct side_view {
 	float clear;     // 1 where that is the same for all that is seen, down to 0
 };
 
-// place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical.
-side_view side_view_at(vec2 place, vec2 heading, float mu_v)
+// place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical; rugged: by how much sides are met elsewhere, m (field_rugged).
+side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 {
+#if FIELD_ALONG == 1
+	side_view none;
+	none.told = none.thickness = none.above = none.entry = 0.0;
+	none.place = place;
+	none.clear = 1.0;
+	return none;
+#else
 	vec2 ahead = heading * (min(sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v, SIDE_SLOPE_MAX) * inversesqrt(max(dot(heading, heading), 1e-12)));
 	vec2 uv = field_place(place) / cloud_layer.z;
 	vec2 stride = ahead * (cloud_layer.y / cloud_layer.z);
@@ -71,8 +91,12 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v)
 	tops[0] = packed_linear(thickness_packed, uv, int(SIDE_SIZE), 0.0);
 	// What lies between slices of a slanted view is not looked at; it would leave hooks and bars.
 	float level = log2(max(length(stride) * SIDE_SIZE, 1e-3)) - SIDE_SHARP;
-	for (int i = 1; i < SIDE_SLICES; i++)
-		tops[i] = packed_linear_between(thickness_packed, uv + stride * SIDE_HEIGHTS[i], int(SIDE_SIZE), level - (i == 1 ? 1.0 : 0.0));
+	// Elsewhere at each height: no flank is a plane that a view may lie in. Straight up none is seen.
+	vec2 shift = rugged * (min(length(ahead), 1.0) / cloud_layer.z);
+	for (int i = 1; i < SIDE_SLICES; i++) {
+		tops[i] = packed_linear_between(thickness_packed, uv + stride * SIDE_HEIGHTS[i] + shift, int(SIDE_SIZE), level - (i == 1 ? 1.0 : 0.0));
+		shift = vec2(-shift.y, shift.x);
+	}
 	vec4 bottoms = cloud_layer.y * SIDE_HEIGHTS;
 	vec4 ends = vec4(bottoms.y, bottoms.z, bottoms.w, cloud_layer.y);
 	// How far inside the view is where a slice begins and ends; a top of 0 is none.
@@ -80,10 +104,16 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v)
 	float none = max(1.0 - 0.1 * tops.x, 0.0);
 	from.x -= SIDE_NONE * none;
 	vec4 to = vec4(from.y, from.z, from.w, tops.w - ends.w);
-	vec4 filled = (ends - bottoms) * (max(from, vec4(0.0)) + max(to, vec4(0.0))) / (abs(from) + abs(to) + 1e-3);
+	// Along a flank both are next to nothing: of that no edge is made. In an even layer they are as far apart as the slice is high; that stays as it is.
+	vec4 both = abs(from) + abs(to);
+	vec4 little = max(vec4(1.0) - both / (min(ends - bottoms, vec4(4.0 * SIDE_ALONG)) + 1e-3), vec4(0.0));
+	vec4 filled = (ends - bottoms) * (max(from, vec4(0.0)) + max(to, vec4(0.0))) / (both + SIDE_ALONG * little * little + 1e-3);
 	vec4 begins = ends - mix(filled, ends - bottoms, step(vec4(0.0), from));
 	// Of what is thin at the base both are seen, that and the side behind it.
-	float side = filled.x;
+	float above = filled.y + filled.z + filled.w;
+	float rim = min((filled.x + above) / (SIDE_RIM * cloud_layer.y + 1e-3), 1.0);
+	rim *= 2.0 - rim;
+	float side = filled.x * rim;
 	filled.x = max(side, min(tops.x, ends.x));
 	begins.x *= none * side / (filled.x + 1e-3);
 	vec4 before = vec4(0.0, filled.x, filled.x + filled.y, filled.x + filled.y + filled.z);
@@ -94,14 +124,17 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v)
 	vec4 seen = (vec4(1.0) - passed) * vec4(1.0, passed.x, left, left * passed.z);
 	side_view view;
 	view.told = smoothstep(0.12, 0.24, mu_v);
-	view.thickness = before.w + filled.w;
-	view.above = view.thickness - filled.x;
-	seen *= view.told / max(seen.x + seen.y + seen.z + seen.w, 1e-4);
+	view.above = above * rim;
+	view.thickness = filled.x + view.above;
+	// A rim through which the base shows, thin as that may be, is not all there is.
+	float sum = seen.x + seen.y + seen.z + seen.w;
+	seen *= view.told / (sum + SIDE_BESIDE * (1.0 - sum));
 	vec4 entries = max(begins - before, vec4(0.0));
 	view.entry = dot(seen, entries);
 	view.clear = 1.0 / (1.0 + (dot(seen, entries * entries) - view.entry * view.entry) * (1.0 / (SIDE_CLEAR * SIDE_CLEAR)));
 	view.place = place + ahead * view.entry;
 	return view;
+#endif
 }
 
 // A place of the layer as it is seen from below and lit.
@@ -113,6 +146,14 @@ struct side_lit {
 	float light;     // light that is scattered often over that of a layer so thick
 };
 
+// What a beam that meets `whole` passes with detail that makes h out of `base`, m. Where a beam meets less than stands there, detail counts in proportion: added, it would leave holes.
+const float SIDE_LITTLE = 2.0; // m
+
+float side_beam(float h, float base, float whole)
+{
+	return whole > base ? h + (whole - base) : h * ((whole + SIDE_LITTLE) / (base + SIDE_LITTLE));
+}
+
 // thickness, inside: at view.place, with all detail, m.
 side_lit side_lit_at(side_view view, float footprint, float thickness, float inside)
 {
@@ -123,17 +164,28 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	float lod = max(log2(footprint * SIDE_SIZE / cloud_layer.z), 0.0);
 #endif
 	vec4 light = textureLod(side_light, uv, lod);
-	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), 0.0);
-	float more = view.told * (view.thickness - base);
 	side_lit lit;
+	float side = 0.0;
+#if FIELD_ALONG == 1
+	lit.thickness = lit.sun = thickness;
+	lit.inside = inside;
+#else
+	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), 0.0);
 	thickness = mix(base, thickness, view.clear);
 	inside = mix(base, inside, view.clear);
-	// A slanted way through the layer is all cloud at most.
-	lit.thickness = min(max(thickness + more, 0.4 * view.told * view.above), cloud_layer.y);
-	lit.inside = min(max(inside + more, 0.4 * view.told * view.above), cloud_layer.y);
-	lit.sun = max(thickness + view.told * (light.w - base), 0.0);
+	// On sides detail is more or less of what is met there: added, it would end rims with an edge. A slanted way through the layer is all cloud at most.
+	side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
+	float whole = mix(base, view.thickness, view.told);
+	float sided = min(side * 2.0, 1.0);
+	vec2 detail = (vec2(thickness, inside) - base) * (1.0 + SIDE_ROUGHER * sided);
+	vec2 part = vec2(whole) / (vec2(whole + 1e-3) + abs(detail));
+	vec2 met = vec2(whole) + detail * mix(vec2(1.0), part, sided);
+	met = min(max(met, vec2(0.4 * view.told * view.above)), vec2(cloud_layer.y));
+	lit.thickness = met.x;
+	lit.inside = met.y;
+	lit.sun = side_beam(thickness, base, mix(base, light.w, view.told));
+#endif
 	float spread = slab_light.w * lit.inside;
-	float side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
 	lit.smooth_m = mix(lit.inside, light.x, spread / (1.0 + spread));
 	lit.light = mix(light.y, light.z, side) / side_transmitted(lit.smooth_m);
 	return lit;

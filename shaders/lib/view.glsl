@@ -401,7 +401,7 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	float footprint = camera_footprint(t, cos_view);
 #if VIEW_SOLVED
 	// The paper's model knows a plane base alone.
-	side_view side = side_view_at(place, vec2(direction), cos_view);
+	side_view side = side_view_at(place, vec2(direction), cos_view, field_rugged(place));
 	vec2 seen = side.place;
 #else
 	vec2 seen = place;

@@ -155,8 +155,8 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 air = sky_table_coordinates(direction);
 	vec2 unit = up_unit(air);
 	up_ray ray = up_ray_of(direction);
-	side_view side = side_view_at(ray.place, vec2(direction), ray.mu_v);
-#ifdef FIELD_ALONG
+	side_view side = side_view_at(ray.place, vec2(direction), ray.mu_v, field_rugged(ray.place));
+#if FIELD_ALONG
 	vec3 layer = field_thickness_along(ray.place, vec2(direction), ray.footprint, ray.mu_v, extinction_scaled.y);
 #if FIELD_ALONG == 2
 	if (ray.mu_v >= FIELD_ALONG_COSINE)
@@ -184,7 +184,7 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 half_angle = scattering_half_angle(-vec3(sun_direction), -direction);
 	vec3 first = up_first_at(half_angle, solved_mean_depth(extinction_scaled.y * along_sun, tau.y / ray.mu_v)) *
 	             up_single(tau / ray.mu_v, vec3(extinction_scaled) * along_sun, along_light, along_view);
-#ifdef FIELD_ALONG
+#if FIELD_ALONG
 	first *= layer.y;
 #endif
 	vec4 light = up_light_at(unit, depth_unit);
@@ -195,12 +195,9 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec3 beside = clear * view_air_beside(along_view, half_angle, ray.distance);
 	vec3 radiance = vec3(near) + beside + vec3(sky) * along_view + met * diffuse +
 	                vec3(sun) * (thickness > 0.01 ? 1.0 : 0.0) * (first + met * lit.light * vec3(light));
-#ifndef FIELD_NEAR
 #if VIEW_LARGE_SUN
 	disc *= exp(-vec3(extinction) * (thickness / ray.mu_v));
 #endif
-	radiance += disc;
-#endif
-	return radiance;
+	return radiance + disc;
 }
 #endif

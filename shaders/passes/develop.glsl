@@ -1,5 +1,6 @@
 // The develop stage: exposure, tone and sRGB encoding of a finished picture. DEVELOP_NEAR: for codes of 8 bits. DEVELOP_ROUND: a fisheye, whose circle ends within
 // pixels: they are dark by as much of them as lies outside, and show what lies inside beside them.
+#define COLOUR_NEAR DEVELOP_NEAR
 #include "shaders/lib/colour.glsl"
 
 uniform sampler2D picture;

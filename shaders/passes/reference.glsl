@@ -137,11 +137,13 @@ void reference_start(INOUT(light_path) path, INOUT(reference_sums) sums, ivec2 p
 	path.turns = 0;
 	path.first = true;
 	path.straight = true;
+	path.bends = 0.0;
 	path.lifted = false;
 	path.grounded = 0;
 	path.arc = 0.0;
 	path.reach = 1.0;
-	path.cloudy = 0;
+	path.behind = 1.0;
+	path.cloudy = ivec2(0);
 	path.looked = vec2(1.0);
 	path.mean = 0.0;
 	path.whole = 0.0;
@@ -192,6 +194,7 @@ void reference_scatter(INOUT(light_path) path)
 		path.pick_passes = passes;
 		path.pick_kind = KIND_ORDER0 + min(path.turns + 1, 3);
 		path.pick_straight = path.straight;
+		path.pick_bends = path.bends;
 	}
 	float share = path_random(path);
 	float around = path_random(path);
@@ -211,7 +214,9 @@ void reference_look(INOUT(light_path) path)
 	vec3 weight = path_sun_begin(path, path.pick_place, height, mu_sun, path.pick_ratio, REFERENCE_PATIENCE * path.pick_sum / path.pick_passes);
 	vec2 half_angle = scattering_half_angle(path.pick_direction, path.direction);
 	bool forward = half_angle.x < FORWARD_PEAK_SINE;
-	bool counts = !forward || (path.pick_straight && path.left == 0);
+	bool counts = !forward || path.pick_straight;
+	float bend = path_bend(half_angle.x);
+	path.weighed = forward ? vec2(bend, path.pick_bends + bend) : vec2(1.0);
 	path.sun = weight * phase_full(half_angle) * (0.25 / PI * path.pick_sum / path.pick_worth) * sun_irradiance(height, mu_sun);
 	path.kind = reference_kind(path, forward ? KIND_ORDER0 : path.pick_kind);
 	path.pick_sum = 0.0;
@@ -331,6 +336,7 @@ void reference_ground(INOUT(light_path) path, INOUT(reference_sums) sums, float 
 	float base = cloud_layer.x;
 	float mu_sun = clamp(dot(up, vec3(sun_direction)), -1.0, 1.0);
 	vec3 entry = path.place + vec3(sun_direction) * sphere_distance_up(0.0, max(mu_sun, 0.0), base);
+	path.weighed = vec2(1.0);
 	path.sun = path_sun_begin(path, entry, base, max(mu_sun, 0.01), path.ratio, 4.0) * sun_irradiance(0.0, mu_sun);
 	float mu_out = dot(up, path.direction);
 	vec3 seen_in = vec3(detail.x * max(mu_out, 0.0) / PI);
@@ -398,7 +404,7 @@ void reference_step(INOUT(light_path) path)
 	float over = path_height(path.place) - cloud_layer.x - path_bound(path.place);
 	// Nothing stands so high around here: on to where it might, or to where the search expects cloud.
 	int part = path_part_at(path.arc / path.reach);
-	bool empty = over > 1.0 && !(searches && path_part_cloudy(path.cloudy, part));
+	bool empty = over > 1.0 && !(searches && path_part_cloudy(path.cloudy.x, part));
 	float reach = field_warp_reach(vec2(path.place) / cloud_layer.z) * cloud_layer.z / PATH_BOUNDS_SIZE / max(length(vec2(path.direction)), 1e-3);
 	float t = -log(path_random(path)) / largest;
 	if (empty) {
@@ -414,6 +420,9 @@ void reference_step(INOUT(light_path) path)
 	path.place += path.direction * t;
 	path.arc += t;
 	float height = path_height(path.place) - cloud_layer.x;
+	// Not beyond the layer's end.
+	float beyond = height < 0.0 ? height : max(height - cloud_layer.y, 0.0);
+	path.arc -= clamp(beyond / (abs(mu) < 1e-4 ? 1e-4 : mu), 0.0, t);
 	path.top = path_top(path.place);
 	bool inside = height >= 0.0 && height < path.top;
 	if (height < 0.0 || height > cloud_layer.y) {

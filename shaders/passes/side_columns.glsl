@@ -21,6 +21,12 @@ float column_passed(vec2 uv, float z, float from, float to)
 	return sum;
 }
 
+// Share of what diffuses through `whole` that leaves a column of h on this side: behind a thicker cloud it is near the other side too, and light leaves by both.
+float column_leaves(float h, float whole)
+{
+	return 0.5 + 0.5 * min(h / max(whole, 1.0), 1.0);
+}
+
 void pass(ivec2 pixel)
 {
 	vec2 uv = (vec2(pixel) + 0.5) / arguments[0].x;
@@ -30,5 +36,5 @@ void pass(ivec2 pixel)
 	float above = column_passed(uv, side, side, cloud_layer.y);
 	float behind = column_passed(uv, side, 0.0, side);
 	float weight = h + 1e-2;
-	STORE(0, vec4(weight * side_source(passed, 0.0), weight * side_source(above, behind), weight, passed));
+	STORE(0, vec4(weight * side_source(passed, 0.0) * column_leaves(h, passed), weight * side_source(above, behind) * column_leaves(h, above + behind), weight, passed));
 }

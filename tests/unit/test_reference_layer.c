@@ -49,6 +49,47 @@ static void layers_look_as_the_slab_does(void **state)
 	}
 }
 
+/* Ways to a low sun bend by more than a little of its height, and leave the layer elsewhere than the straight one: seen in the mean over
+ * directions, by how far each is known. */
+static void low_suns_lose_nothing(void **state)
+{
+	(void)state;
+	static const double mu_v[] = {0.65, 0.7, 0.55, 0.85, 0.4, 0.3, 0.9, 0.8}, azimuth[] = {1.3, 1.9, 0.6, 0.1, 2.4, 0.9, 2.8, 3.1};
+	const struct layer_case is = {.tables = tables, .thickness_m = 80, .sun_zenith_deg = 80, .sun = true};
+	struct uniform_layer layer;
+	layer_init(&layer, &is);
+	double deviation = 0, weights = 0;
+	for (int i = 0; i < 8; i++) {
+		const bool above = i % 2;
+		const struct layer_seen seen = layer_see(&layer, above, mu_v[i], azimuth[i], 100000, THREADS);
+		const double expected = slab_at(&is, 1, above, mu_v[i], azimuth[i]), weight = pow(expected / seen.error[1], 2);
+		deviation += weight * (seen.mean[1] / expected - 1);
+		weights += weight;
+	}
+	layer_finish(&layer);
+	print_message("sun at 10 degrees: %.2f +- %.2f %% off\n", 100 * deviation / weights, 100 / sqrt(weights));
+	assert_true(1 / sqrt(weights) < 0.006);
+	assert_true(fabs(deviation / weights) < 3 / sqrt(weights));
+}
+
+/* Beside the sun all light has been scattered forward alone; no sample of it outshines the others. */
+static void aureoles_are_even(void **state)
+{
+	(void)state;
+	const struct layer_case is = {.tables = tables, .thickness_m = 60, .sun_zenith_deg = 55, .sun = true};
+	struct uniform_layer layer;
+	layer_init(&layer, &is);
+	for (int i = 0; i < 2; i++) {
+		const double mu_v = cos((i == 0 ? 52 : 59) * DEGREE);
+		const struct layer_seen seen = layer_see(&layer, false, mu_v, 0, 60000, THREADS);
+		const double expected = slab_at(&is, 1, false, mu_v, 0);
+		print_message("%d degrees from the sun: %.4f +- %.4f, slab %.4f\n", i == 0 ? 3 : 4, seen.mean[1], seen.error[1], expected);
+		assert_true(seen.error[1] < 0.012 * expected);
+		assert_true(fabs(seen.mean[1] - expected) < 3 * seen.error[1] + 0.01 * expected);
+	}
+	layer_finish(&layer);
+}
+
 /* F0 P/(4 pi) mu_l/(mu_l +- mu_v) (...), of so thin a layer tau P/(4 pi mu_v); what is scattered twice is a share of tau. */
 static void thin_layers_scatter_once(void **state)
 {
@@ -115,6 +156,8 @@ int main(void)
 	struct kernel *kernel = kernel_load(path ? path : "build/mie.kernel");
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(layers_look_as_the_slab_does),
+		cmocka_unit_test(low_suns_lose_nothing),
+		cmocka_unit_test(aureoles_are_even),
 		cmocka_unit_test(thin_layers_scatter_once),
 		cmocka_unit_test(furnace_is_white),
 		cmocka_unit_test(samples_depend_on_the_seed_alone),

@@ -185,6 +185,33 @@ static void clear_skies_have_no_error(void **state)
 	frame_finish(&slab);
 }
 
+/* Paths through an empty layer bring what there is without one. */
+static void empty_layers_are_clear_skies(void **state)
+{
+	(void)state;
+	for (int low = 0; low < 2; low++) {
+		struct scene scene = reference_scene(64, LAYER(COLOR));
+		scene.clouds.coverage = 0;
+		scene.camera.elevation_deg = 5; /* sky and ground */
+		scene.sun.elevation_deg = low ? 4 : 40;
+		struct frame traced = render(&scene);
+		scene.model.name = MODEL_SLAB;
+		struct frame solved = render(&scene);
+		for (int half = 0; half < 2; half++) {
+			double a = 0, b = 0;
+			for (int y = half * HEIGHT / 2; y < (half + 1) * HEIGHT / 2; y++)
+				for (int x = 0; x < WIDTH; x++) {
+					a += luminance_of(&traced, LAYER_COLOR, x, y);
+					b += luminance_of(&solved, LAYER_COLOR, x, y);
+				}
+			print_message("sun at %.0f degrees, half %d: %.4f\n", scene.sun.elevation_deg, half, a / b);
+			assert_true(a / b > 0.985 && a / b < 1.015);
+		}
+		frame_finish(&traced);
+		frame_finish(&solved);
+	}
+}
+
 /* Each kind has a program of its own in the reference. */
 static void grounds_are_those_of_the_slab(void **state)
 {
@@ -218,6 +245,7 @@ int main(void)
 		cmocka_unit_test(time_ends_the_paths),
 		cmocka_unit_test(grounds_are_those_of_the_slab),
 		cmocka_unit_test(clear_skies_have_no_error),
+		cmocka_unit_test(empty_layers_are_clear_skies),
 	};
 	return RUN_WITH_RENDERER(tests);
 }

@@ -218,6 +218,15 @@ static void srgb_curve(void **)
 	}
 }
 
+static void power_near(void **)
+{
+	assert_near(colour_power_near(0), 0, 0);
+	for (int i = -2000; i <= 3000; i++) {
+		const double x = std::exp2(i * 0.01 + 0.0037);
+		assert_near(colour_power_near((float)x) / std::pow(x, 1.15), 1, 1.3e-4);
+	}
+}
+
 static void filmic_curve_rises(void **)
 {
 	float before = -1;
@@ -321,6 +330,7 @@ int main()
 		cmocka_unit_test(sunlight_above_the_air),
 		cmocka_unit_test(bands_become_colours),
 		cmocka_unit_test(srgb_curve),
+		cmocka_unit_test(power_near),
 		cmocka_unit_test(filmic_curve_rises),
 		cmocka_unit_test(suns_keep_their_hue),
 		cmocka_unit_test(brighter_is_brighter),

@@ -156,7 +156,7 @@ static void an_even_layer_is_a_slab(void **)
 		for (double mu : {1., 0.5, 0.13}) {
 			const double found = even(0, 0);
 			const glsl::spread_pass::side_view view =
-				glsl::spread_pass::side_view_at(vec2(1234, 9876), vec2(0.3f, -0.8f), (float)mu);
+				glsl::spread_pass::side_view_at(vec2(1234, 9876), vec2(0.3f, -0.8f), (float)mu, vec2(0));
 			const glsl::spread_pass::side_lit lit = glsl::spread_pass::side_lit_at(view, 1, (float)found, (float)found);
 			assert_float_equal(view.entry, 0, 0.01);
 			assert_float_equal(lit.thickness, found, 0.02);
@@ -165,6 +165,22 @@ static void an_even_layer_is_a_slab(void **)
 			assert_float_equal(lit.light, 1, 1e-3);
 		}
 	}
+}
+
+/* Nor of layers whose slices are thinner than what edges are made soft over. */
+static void a_thin_even_layer_is_a_slab(void **)
+{
+	for (double deep : {50., 100., 200.})
+		for (double share : {0.2, 0.5, 1.}) {
+			make([=](double, double) { return share * deep; }, 35, 50);
+			glsl::cloud_layer.y = (float)deep;
+			for (double mu : {0.99, 0.5, 0.13}) {
+				const glsl::spread_pass::side_view view =
+					glsl::spread_pass::side_view_at(vec2(1234, 9876), vec2(0.3f, -0.8f), (float)mu, vec2(0));
+				assert_float_equal(view.thickness, share * deep, 0.01);
+				assert_float_equal(view.entry, 0, 0.01);
+			}
+		}
 }
 
 /* Evening out is a mean: the layer stays as thick as it is. */
@@ -224,7 +240,7 @@ static void views_meet_what_brute_force_meets(void **)
 			const double x = tile * random_unit(), y = tile * random_unit(), a = 2 * pi * random_unit();
 			const double truth = passed(cells, x, y, slope * std::sin(a), slope * std::cos(a));
 			const glsl::spread_pass::side_view view = glsl::spread_pass::side_view_at(
-				vec2((float)x, (float)y), vec2((float)std::sin(a), (float)std::cos(a)), (float)mu);
+				vec2((float)x, (float)y), vec2((float)std::sin(a), (float)std::cos(a)), (float)mu, vec2(0));
 			squares += std::pow(view.thickness - truth, 2) / count;
 			flat += std::pow(cells(x, y) - truth, 2) / count;
 			mean += view.thickness / count;
@@ -257,13 +273,44 @@ static void a_wall_has_a_bright_side(void **)
 	}
 }
 
+/* Detail neither ends the rim of a side with an edge nor leaves holes in its shade: it is in proportion to what is met there. */
+static void rims_are_thin(void **)
+{
+	make(cells, 25, 120);
+	for (double detail : {-60., 60.}) {
+		double thickest = 0, least_sun = 1e9;
+		int rims = 0;
+		for (double x = 0; x < tile; x += 1) {
+			const glsl::spread_pass::side_view view =
+				glsl::spread_pass::side_view_at(vec2((float)x, 5200), vec2(1, 0), 0.45f, vec2(0));
+			const double base = cells((double)view.place.x, (double)view.place.y);
+			const float thickness = base > 0 ? (float)std::fmax(base + detail, 0) : 0;
+			const glsl::spread_pass::side_lit lit = glsl::spread_pass::side_lit_at(view, 1, thickness, thickness);
+			if (view.thickness < 5 && base > 60) {
+				rims++;
+				thickest = std::fmax(thickest, (double)lit.thickness);
+			}
+			if (thickness > 60)
+				least_sun = std::fmin(least_sun, (double)lit.sun);
+		}
+		print_message("detail of %.0f m: %d rims of less than 5 m are %.2f m thick at most; the beam meets %.2f m at least where a "
+			      "column has 60 m\n",
+			      detail, rims, thickest, least_sun);
+		assert_true(rims > 10);
+		assert_true(thickest < 12);
+		assert_true(least_sun > 0.5);
+	}
+}
+
 int main()
 {
 	const CMUnitTest tests[] = {
 		cmocka_unit_test(an_even_layer_is_a_slab),
+		cmocka_unit_test(a_thin_even_layer_is_a_slab),
 		cmocka_unit_test(spreading_keeps_the_mean),
 		cmocka_unit_test(beams_pass_what_brute_force_passes),
 		cmocka_unit_test(views_meet_what_brute_force_meets),
+		cmocka_unit_test(rims_are_thin),
 		cmocka_unit_test(a_wall_has_a_bright_side),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -162,7 +162,7 @@ static void random_scenes_are_sane(void **state)
 #ifdef __SANITIZE_ADDRESS__
 	enum { SCENES = 25 };
 #else
-	enum { SCENES = 120 };
+	enum { SCENES = 200 };
 #endif
 	enum { SCENES_OF_A_CLOUD = 8 }; /* droplets cost more to solve than so small a picture to draw */
 	struct scene_dsd dsd = {0};

@@ -305,12 +305,9 @@ static void rims_are_thin(void **)
 int main()
 {
 	const CMUnitTest tests[] = {
-		cmocka_unit_test(an_even_layer_is_a_slab),
-		cmocka_unit_test(a_thin_even_layer_is_a_slab),
-		cmocka_unit_test(spreading_keeps_the_mean),
-		cmocka_unit_test(beams_pass_what_brute_force_passes),
-		cmocka_unit_test(views_meet_what_brute_force_meets),
-		cmocka_unit_test(rims_are_thin),
+		cmocka_unit_test(an_even_layer_is_a_slab),           cmocka_unit_test(a_thin_even_layer_is_a_slab),
+		cmocka_unit_test(spreading_keeps_the_mean),          cmocka_unit_test(beams_pass_what_brute_force_passes),
+		cmocka_unit_test(views_meet_what_brute_force_meets), cmocka_unit_test(rims_are_thin),
 		cmocka_unit_test(a_wall_has_a_bright_side),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -158,7 +158,8 @@ def test_partial_comparison(daemon):
     answer, _ = in_growing_time(lambda ms: compare(daemon, body, X_Timeout_Ms=ms))
     assert answer.status == 200 and answer.json["variants"][1]["partial"] is True and answer.json["variants"][1]["samples"] > 0
     variants[1]["model"]["partial"] = False
-    assert compare(daemon, {"scene": {"output": {"width": 48, "height": 32}}, "variants": variants}, X_Timeout_Ms="1500").status == 504
+    # Too late, or refused at once as soon as the daemon knows what a reference takes.
+    assert compare(daemon, {"scene": {"output": {"width": 48, "height": 32}}, "variants": variants}, X_Timeout_Ms="1500").status in (503, 504)
 
 
 def test_others_pass_a_long_reference(daemon):

@@ -51,9 +51,16 @@ static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size
 	return MHD_CONTENT_READER_END_OF_STREAM;
 }
 
-struct MHD_Response *response_create_unsized(void)
+struct MHD_Response *response_create_unsized(struct request *request)
 {
-	return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1024, read_nothing, NULL, NULL);
+	struct MHD_Response *response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1024, read_nothing, NULL, NULL);
+	request->closes = true;
+	if (response && MHD_set_response_options(response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END) == MHD_YES)
+		return response;
+	log_error("response_create_unsized: out of memory");
+	if (response)
+		MHD_destroy_response(response);
+	return NULL;
 }
 
 void response_set(struct MHD_Response *response, const char *name, const char *value)
@@ -86,7 +93,7 @@ enum MHD_Result response_send(struct request *request, unsigned status, struct M
 	response_set(response, "X-Request-Id", request->id);
 	if (request->closes || connection_is_surplus(request->socket))
 		response_set(response, "Connection", "close");
-	if (!request->is_accepted)
+	if (!request->is_accepted || request->closes)
 		connection_linger(request->socket);
 	connection_work(request->socket);
 	enum MHD_Result result = library_queue_response(request->connection, status, response);

@@ -17,8 +17,9 @@ struct MHD_Response *response_create(struct request *request, char *data, size_t
 /* Likewise of an image that others hold too. Takes over one hold of it. */
 struct finished_image;
 struct MHD_Response *response_create_shared(struct request *request, struct finished_image *image);
-/* For a HEAD that is answered without computing, so that the length is unknown. */
-struct MHD_Response *response_create_unsized(void);
+/* For a HEAD that is answered without computing, so that the length is unknown. The connection is closed behind it: to keep it
+ * libmicrohttpd (0.9.75) would send chunks, whose end it writes although a HEAD has no body, and which the next answer would begin with. */
+struct MHD_Response *response_create_unsized(struct request *request);
 void response_set(struct MHD_Response *response, const char *name, const char *value);
 
 /* Sends with the headers every answer has; the response is given up in any case. NULL answers nothing. */

@@ -5,6 +5,7 @@
  * limit begins anew with every byte. So a thread of this module watches all sockets beside it, and reads nothing from them:
  * - the first byte of a request is when its deadline begins to count, and from when on it must be complete in time;
  * - a request that is not is answered 408 and its connection is closed;
+ * - an end of the client's that comes with a request's last bytes, which libmicrohttpd does not see then, is shown to it again;
  * - a client that closes its end, or only its sending half, while its request is worked for counts as gone: the two look alike (RFC
  * 9112, 9.6 lets a server close then), and whoever wants an answer keeps the connection open.
  *

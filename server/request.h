@@ -19,6 +19,9 @@
 
 enum { REQUEST_ID_SIZE = 129, REQUEST_TIMEOUT_MS_MAX = 3600000 };
 
+/* In the log and among the counters, as nginx has it: who asked left before the answer was whole. */
+enum { STATUS_CLIENT_LEFT = 499 };
+
 struct request;
 struct service;
 

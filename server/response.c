@@ -242,14 +242,6 @@ enum MHD_Result response_send_problem_past(struct request *request)
 	return MHD_NO;
 }
 
-void response_write_problem_past(struct MHD_Connection *connection, struct connection *socket, const struct problem *problem)
-{
-	char *body = problem_to_json(problem, NULL, 0);
-	if (body)
-		write_past(connection, socket, problem_status(problem->kind), "", body);
-	free(body);
-}
-
 void response_end_past(struct MHD_Connection *connection)
 {
 	const union MHD_ConnectionInfo *tls = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);

@@ -12,6 +12,9 @@
 #define CACHE_ASK  "no-cache"
 #define CACHE_NONE "no-store"
 
+/* What is wrong with a request whose client ended in the middle of it. */
+#define REQUEST_CUT "The connection ended before the request did."
+
 /* The answer to a request. Takes over malloc'd data (also on failure). NULL when out of memory. */
 struct MHD_Response *response_create(struct request *request, char *data, size_t size);
 /* Likewise of an image that others hold too. Takes over one hold of it. */
@@ -38,8 +41,6 @@ enum MHD_Result response_send_json(struct request *request, unsigned status, jso
 /* Sends request->problem where libmicrohttpd takes no response: while a body is still coming in, or for what it cannot read. The answer is
  * written to the socket. MHD_NO: the connection closes, and what the client still sends is read for a while (lingering.h). */
 enum MHD_Result response_send_problem_past(struct request *request);
-/* Likewise a problem of what is no request, so that nothing is counted. */
-void response_write_problem_past(struct MHD_Connection *connection, struct connection *socket, const struct problem *problem);
 /* Nothing that libmicrohttpd writes from here on is sent. */
 void response_end_past(struct MHD_Connection *connection);
 /* 413 while a body of more than `limit` bytes is still coming in. */

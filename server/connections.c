@@ -5,6 +5,7 @@
 #include "server/lingering.h"
 
 #include <errno.h>
+#include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -16,6 +17,7 @@
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -454,6 +456,19 @@ void connection_linger(struct connection *connection)
 {
 	if (connection)
 		connection->lingers = true;
+}
+
+uint64_t connection_written(const struct connection *connection)
+{
+	int unacknowledged = 0;
+	if (!connection || ioctl(connection->fd, SIOCOUTQ, &unacknowledged) != 0)
+		return 0;
+	return connection_acknowledged(connection) + (uint64_t)unacknowledged;
+}
+
+uint64_t connection_acknowledged(const struct connection *connection)
+{
+	return connection ? ask_system(connection).tcpi_bytes_acked : 0;
 }
 
 void connection_set_request(struct connection *connection, struct request *request)

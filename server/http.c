@@ -226,6 +226,15 @@ static void refuse_part(struct request *request, struct MHD_Connection *connecti
 	response_send_problem_past(request);
 }
 
+/* The client left in the middle of its answer, or did not read it for IDLE_SECONDS: what it has of it counts. */
+static void cut(struct request *request)
+{
+	const uint64_t gone = connection_acknowledged(request->socket);
+	const uint64_t taken = gone > request->sent_before ? gone - request->sent_before : 0;
+	request->cut_status = request->status;
+	request->bytes = taken < request->bytes ? taken : request->bytes;
+}
+
 /* Bytes of all of a request; 0: not known. */
 static uint64_t whole_size(const struct request *request)
 {
@@ -245,10 +254,12 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	const bool is_slow = connection_is_slow(request->socket);
 	if (!request->status && !is_slow && code == MHD_REQUEST_TERMINATED_CLIENT_ABORT)
 		refuse_part(request, connection);
+	else if (request->status && !request->is_past && code != MHD_REQUEST_TERMINATED_COMPLETED_OK)
+		cut(request);
 	if (code == MHD_REQUEST_TERMINATED_COMPLETED_OK)
 		library_reads_end(connection, whole_size(request));
 	double took = clock_now_ms() - request->started_ms;
-	unsigned status = request->status ? request->status : is_slow ? 408 : STATUS_CLIENT_LEFT;
+	unsigned status = request->status && !request->cut_status ? request->status : is_slow ? 408 : STATUS_CLIENT_LEFT;
 	enum metrics_route route = request->route ? request->route->metrics : ROUTE_OTHER;
 	if (request->is_head)
 		request->bytes = 0; /* those that a GET would send */
@@ -256,7 +267,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	if (!request->status && status == 408)
 		metrics_count_problem(service->metrics, PROBLEM_READ_TIMEOUT);
 	metrics_count_request(service->metrics, route, status, took, request->bytes);
-	access_end(request, status);
+	access_end(request, request->cut_status ? request->cut_status : status); /* it was made, and counts against the key */
 	request_log(request, status, took);
 	if (request->is_accepted)
 		service->in_flight--;

@@ -81,6 +81,23 @@ static void keep_private(const struct request *request, struct MHD_Response *res
 		response_set(response, "Cache-Control", CACHE_KEEP_PRIVATE);
 }
 
+static enum MHD_Result add_header_size(void *sum, enum MHD_ValueKind kind, const char *name, const char *value)
+{
+	(void)kind;
+	*(uint64_t *)sum += strlen(name) + strlen(value) + sizeof ": \r\n" - 1;
+	return MHD_YES;
+}
+
+/* Bytes before the body, as libmicrohttpd writes them: its own headers are a date, a length and now and then what becomes of the
+ * connection, which is left out. */
+static uint64_t head_size(unsigned status, struct MHD_Response *response)
+{
+	static const char own[] = "HTTP/1.1 200 \r\nDate: Sun, 06 Nov 1994 08:49:37 GMT\r\nContent-Length: 1000000\r\n\r\n";
+	uint64_t size = sizeof own - 1 + strlen(MHD_get_reason_phrase_for(status));
+	MHD_get_response_headers(response, add_header_size, &size);
+	return size;
+}
+
 enum MHD_Result response_send(struct request *request, unsigned status, struct MHD_Response *response)
 {
 	if (!response)
@@ -95,6 +112,7 @@ enum MHD_Result response_send(struct request *request, unsigned status, struct M
 		response_set(response, "Connection", "close");
 	if (!request->is_accepted || request->closes)
 		connection_linger(request->socket);
+	request->sent_before = connection_written(request->socket) + head_size(status, response);
 	connection_work(request->socket);
 	enum MHD_Result result = library_queue_response(request->connection, status, response);
 	MHD_destroy_response(response);
@@ -235,6 +253,7 @@ enum MHD_Result response_send_problem_past(struct request *request)
 	if (origin)
 		text_printf(&headers, "Access-Control-Allow-Origin: %s\r\nVary: Origin\r\n", origin);
 	char *body = problem_to_json(&request->problem, request->id, 0);
+	request->is_past = true;
 	if (body && !headers.failed && write_past(request->connection, request->socket, status, headers.data, body))
 		request->status = status, request->bytes = strlen(body);
 	free(body);

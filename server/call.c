@@ -28,7 +28,7 @@ bool call_answer_at_once(struct request *request, const char *tag, call_sender *
 	if (!request->is_post && entity_tag_matches(request_header(request, "If-None-Match"), tag))
 		*result = send(request, MHD_HTTP_NOT_MODIFIED, MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT));
 	else if (request->is_head)
-		*result = send(request, MHD_HTTP_OK, response_create_unsized());
+		*result = send(request, MHD_HTTP_OK, response_create_unsized(request));
 	else
 		return false;
 	return true;

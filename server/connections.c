@@ -5,6 +5,7 @@
 #include "server/lingering.h"
 
 #include <errno.h>
+#include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -16,10 +17,11 @@
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { TICK_MS = 100, EVENTS_MAX = 64 };
+enum { TICK_MS = 100, SHOW_MS = 10, EVENTS_MAX = 64 };
 
 /* Between two requests; from a first byte to the last; from then to the last byte of the answer; likewise, while others work. */
 enum phase { PHASE_IDLE, PHASE_READING, PHASE_WORKING, PHASE_WATCHED };
@@ -42,6 +44,7 @@ struct connection {
 	double begun_ms, limit_ms, body_ms; /* first byte of the request; its end at the latest; the end of its headers */
 	size_t received;
 	uint64_t bytes_before; /* that had come when the last request ended */
+	bool is_ending;        /* the client's end came before the request's */
 	_Atomic bool is_gone, is_slow, lingers;
 };
 
@@ -77,12 +80,20 @@ static void refuse_slowness(const struct connection *connection)
 		log_debug("a slow client could not be answered");
 }
 
-/* All that ever came; 0 when this is no TCP. */
-static uint64_t bytes_come(const struct connection *connection)
+/* Zeros when this is no TCP. */
+static struct tcp_info ask_system(const struct connection *connection)
 {
 	struct tcp_info info = {0};
 	socklen_t size = sizeof info;
-	return getsockopt(connection->fd, IPPROTO_TCP, TCP_INFO, &info, &size) == 0 ? info.tcpi_bytes_received : 0;
+	if (getsockopt(connection->fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0)
+		memset(&info, 0, sizeof info);
+	return info;
+}
+
+/* All that ever came. */
+static uint64_t bytes_come(const struct connection *connection)
+{
+	return ask_system(connection).tcpi_bytes_received;
 }
 
 static void begin_reading(struct connection *connection)
@@ -91,6 +102,7 @@ static void begin_reading(struct connection *connection)
 	connection->phase = PHASE_READING;
 	connection->begun_ms = now_ms;
 	connection->received = 0;
+	connection->is_ending = false;
 	connection->limit_ms = connection->is_surplus ? fmin(connection->limit_ms, limit_ms) : limit_ms;
 }
 
@@ -115,6 +127,30 @@ static void close_slow(struct connections *connections)
 	}
 }
 
+/* After a read that left its buffer room libmicrohttpd waits for another event (it polls at edges), and an end that came with those bytes
+ * brings none. Nothing more can come of a socket that the client has ended, so that closing this direction, too, changes nothing; but it is
+ * an event. One may be spent on bytes that are still to be read, therefore as often as it takes. Returns whether there are such
+ * connections. */
+static bool show_ends(struct connections *connections)
+{
+	bool some = false;
+	for (struct connection *connection = connections->first; connection; connection = connection->next) {
+		if (connection->phase != PHASE_READING || !connection->is_ending)
+			continue;
+		shutdown(connection->fd, SHUT_RD);
+		some = true;
+	}
+	return some;
+}
+
+/* Asks for one event. What stood there before is forgotten. */
+static void ask_for(const struct connection *connection, int operation, uint32_t events)
+{
+	struct epoll_event event = {.events = events | EPOLLONESHOT, .data.u64 = connection->id};
+	if (epoll_ctl(connection->owner->epoll, operation, connection->fd, &event) != 0)
+		log_debug("a connection cannot be watched: %s", strerror(errno));
+}
+
 static struct connection *find(const struct connections *connections, uint64_t id)
 {
 	struct connection *connection = connections->first;
@@ -130,6 +166,10 @@ static void take_event(struct connections *connections, const struct epoll_event
 		return;
 	if (connection->phase == PHASE_IDLE && (event->events & EPOLLIN))
 		begin_reading(connection);
+	if (connection->phase == PHASE_READING && (event->events & EPOLLRDHUP))
+		connection->is_ending = true;
+	else if (connection->phase == PHASE_READING)
+		ask_for(connection, EPOLL_CTL_MOD, EPOLLRDHUP);
 	if (connection->phase == PHASE_WATCHED && (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)))
 		connection->is_gone = true;
 }
@@ -139,8 +179,9 @@ static void *watch(void *context)
 	struct connections *connections = context;
 	struct epoll_event events[EVENTS_MAX];
 	double last_tick_ms = 0;
+	bool some_end = false;
 	while (!connections->stopping) {
-		const int count = epoll_wait(connections->epoll, events, EVENTS_MAX, TICK_MS);
+		const int count = epoll_wait(connections->epoll, events, EVENTS_MAX, some_end ? SHOW_MS : TICK_MS);
 		bool gone = false;
 		pthread_mutex_lock(&connections->mutex);
 		for (int i = 0; i < count; i++) {
@@ -150,6 +191,7 @@ static void *watch(void *context)
 		const bool late = clock_now_ms() >= last_tick_ms + TICK_MS;
 		if (late)
 			close_slow(connections);
+		some_end = show_ends(connections);
 		pthread_mutex_unlock(&connections->mutex);
 		lingering_work(connections->lingering);
 		if (!late && !gone)
@@ -291,14 +333,6 @@ bool connections_accept(struct connections *connections, const struct sockaddr *
 
 /* --- one of them ------------------------------------------------------------------------------------------------------------------ */
 
-/* Asks for one event. What stood there before is forgotten. */
-static void ask_for(const struct connection *connection, int operation, uint32_t events)
-{
-	struct epoll_event event = {.events = events | EPOLLONESHOT, .data.u64 = connection->id};
-	if (epoll_ctl(connection->owner->epoll, operation, connection->fd, &event) != 0)
-		log_debug("a connection cannot be watched: %s", strerror(errno));
-}
-
 static void insert(struct connections *connections, struct connection *connection)
 {
 	connection->next = connections->first;
@@ -324,7 +358,7 @@ struct connection *connection_open(struct connections *connections, int fd, cons
 				 (connection->address && connection->address->count > connections->params.per_address);
 	connections->counts.surplus += connection->is_surplus;
 	connection->limit_ms = clock_now_ms() + CONNECTION_SURPLUS_MS;
-	ask_for(connection, EPOLL_CTL_ADD, EPOLLIN);
+	ask_for(connection, EPOLL_CTL_ADD, EPOLLIN | EPOLLRDHUP);
 	pthread_mutex_unlock(&connections->mutex);
 	return connection;
 }
@@ -369,7 +403,7 @@ static void set_phase(struct connection *connection, enum phase phase)
 	if (phase == PHASE_IDLE)
 		connection->bytes_before = bytes_come(connection);
 	if (phase == PHASE_IDLE)
-		ask_for(connection, EPOLL_CTL_MOD, EPOLLIN);
+		ask_for(connection, EPOLL_CTL_MOD, EPOLLIN | EPOLLRDHUP);
 	if (phase == PHASE_WATCHED)
 		ask_for(connection, EPOLL_CTL_MOD, EPOLLRDHUP);
 	pthread_mutex_unlock(&connection->owner->mutex);
@@ -422,6 +456,19 @@ void connection_linger(struct connection *connection)
 {
 	if (connection)
 		connection->lingers = true;
+}
+
+uint64_t connection_written(const struct connection *connection)
+{
+	int unacknowledged = 0;
+	if (!connection || ioctl(connection->fd, SIOCOUTQ, &unacknowledged) != 0)
+		return 0;
+	return connection_acknowledged(connection) + (uint64_t)unacknowledged;
+}
+
+uint64_t connection_acknowledged(const struct connection *connection)
+{
+	return connection ? ask_system(connection).tcpi_bytes_acked : 0;
 }
 
 void connection_set_request(struct connection *connection, struct request *request)

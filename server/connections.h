@@ -5,6 +5,7 @@
  * limit begins anew with every byte. So a thread of this module watches all sockets beside it, and reads nothing from them:
  * - the first byte of a request is when its deadline begins to count, and from when on it must be complete in time;
  * - a request that is not is answered 408 and its connection is closed;
+ * - an end of the client's that comes with a request's last bytes, which libmicrohttpd does not see then, is shown to it again;
  * - a client that closes its end, or only its sending half, while its request is worked for counts as gone: the two look alike (RFC
  * 9112, 9.6 lets a server close then), and whoever wants an answer keeps the connection open.
  *
@@ -18,6 +19,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #define CONNECTION_SURPLUS_MS 2000.0
 /* Surplus connections that are kept, of all clients and of each. */
@@ -79,6 +81,10 @@ void connection_watch(struct connection *connection);
 void connection_end(struct connection *connection);
 /* It was answered before its end: what is left of it is still read when the connection closes (lingering.h). */
 void connection_linger(struct connection *connection);
+
+/* Bytes that were written to it so far; and those of them that the client's end has acknowledged. 0 when that is not known. */
+uint64_t connection_written(const struct connection *connection);
+uint64_t connection_acknowledged(const struct connection *connection);
 
 /* What is asked on it now, for whoever has the connection alone. NULL: nothing, or nothing that could be read. */
 void connection_set_request(struct connection *connection, struct request *request);

@@ -5,6 +5,7 @@
 #include "server/clock.h"
 #include "server/cors.h"
 #include "server/framing.h"
+#include "server/library_reads.h"
 #include "server/negotiation.h"
 #include "server/request_log.h"
 #include "server/response.h"
@@ -68,6 +69,7 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
 {
 	struct service *service = context;
 	if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
+		library_reads_close(connection);
 		connection_close(*socket_context);
 		*socket_context = NULL;
 		return;
@@ -75,6 +77,7 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
 	const union MHD_ConnectionInfo *fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
 	const union MHD_ConnectionInfo *address = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
 	*socket_context = fd ? connection_open(service->connections, fd->connect_fd, address ? address->client_addr : NULL) : NULL;
+	library_reads_open(service, connection, *socket_context);
 }
 
 static bool allows(const struct route *route, const char *method)
@@ -213,15 +216,50 @@ static enum MHD_Result on_access(void *context, struct MHD_Connection *connectio
 	return request->next(request);
 }
 
+/* The client ended in the middle of what it sends. It may still read, then it hears why nothing comes (RFC 9112, 8). */
+static void refuse_part(struct request *request, struct MHD_Connection *connection)
+{
+	request->connection = connection;
+	if (!*request->id)
+		request_identify(request);
+	problem_set(&request->problem, PROBLEM_BAD_REQUEST, "%s", REQUEST_CUT);
+	response_send_problem_past(request);
+}
+
+/* The client left in the middle of its answer, or did not read it for IDLE_SECONDS: what it has of it counts. */
+static void cut(struct request *request)
+{
+	const uint64_t gone = connection_acknowledged(request->socket);
+	const uint64_t taken = gone > request->sent_before ? gone - request->sent_before : 0;
+	request->cut_status = request->status;
+	request->bytes = taken < request->bytes ? taken : request->bytes;
+}
+
+/* Bytes of all of a request; 0: not known. */
+static uint64_t whole_size(const struct request *request)
+{
+	if (!request->is_accepted || request_header(request, "Transfer-Encoding"))
+		return 0;
+	const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->connection, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+	const char *length = request_header(request, "Content-Length");
+	return info ? info->header_size + (length ? strtoull(length, NULL, 10) : 0) : 0;
+}
+
 static void on_completed(void *context, struct MHD_Connection *connection, void **state, enum MHD_RequestTerminationCode code)
 {
 	struct service *service = context;
 	struct request *request = *state;
-	(void)connection, (void)code;
 	if (!request)
 		return;
+	const bool is_slow = connection_is_slow(request->socket);
+	if (!request->status && !is_slow && code == MHD_REQUEST_TERMINATED_CLIENT_ABORT)
+		refuse_part(request, connection);
+	else if (request->status && !request->is_past && code != MHD_REQUEST_TERMINATED_COMPLETED_OK)
+		cut(request);
+	if (code == MHD_REQUEST_TERMINATED_COMPLETED_OK)
+		library_reads_end(connection, whole_size(request));
 	double took = clock_now_ms() - request->started_ms;
-	unsigned status = request->status ? request->status : connection_is_slow(request->socket) ? 408 : 499;
+	unsigned status = request->status && !request->cut_status ? request->status : is_slow ? 408 : STATUS_CLIENT_LEFT;
 	enum metrics_route route = request->route ? request->route->metrics : ROUTE_OTHER;
 	if (request->is_head)
 		request->bytes = 0; /* those that a GET would send */
@@ -229,7 +267,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
 	if (!request->status && status == 408)
 		metrics_count_problem(service->metrics, PROBLEM_READ_TIMEOUT);
 	metrics_count_request(service->metrics, route, status, took, request->bytes);
-	access_end(request, status);
+	access_end(request, request->cut_status ? request->cut_status : status); /* it was made, and counts against the key */
 	request_log(request, status, took);
 	if (request->is_accepted)
 		service->in_flight--;

@@ -1,7 +1,10 @@
 #include "server/library_answers.h"
 
 #include "renderer/log.h"
+#include "server/clock.h"
 #include "server/framing.h"
+#include "server/library_reads.h"
+#include "server/request_log.h"
 #include "server/response.h"
 #include "server/service.h"
 
@@ -57,13 +60,42 @@ static void state_problem(struct problem *problem, unsigned status, bool in_body
 			: "The request line is malformed, or a header, or Content-Length is no whole number.");
 }
 
+/* There is no request, since nothing of it could be read: one is made for the answer, the log and the counters. */
+static void refuse_line(struct MHD_Connection *connection, struct connection *socket, const struct problem *problem)
+{
+	struct service *service = library_reads_service(connection);
+	struct request *request = service ? request_create(service, socket, "") : NULL;
+	if (!request)
+		return;
+	request->connection = connection;
+	request->problem = *problem;
+	request_identify(request);
+	response_send_problem_past(request);
+	const double took_ms = clock_now_ms() - request->started_ms;
+	const unsigned status = request->status ? request->status : STATUS_CLIENT_LEFT;
+	metrics_count_request(service->metrics, ROUTE_OTHER, status, took_ms, request->bytes);
+	request_log(request, status, took_ms);
+	request_destroy(request);
+}
+
+void library_refuse_line(struct MHD_Connection *connection, struct connection *socket, enum library_fault fault)
+{
+	static const char *const details[] = {[LINE_MALFORMED] =
+						      "A request begins with a method, a blank, and an address without control characters.",
+					      [LINE_OF_TLS] = "This begins a session of TLS, and HTTP is spoken here in the clear.",
+					      [LINE_CUT] = REQUEST_CUT};
+	struct problem problem = {0};
+	problem_set(&problem, PROBLEM_BAD_REQUEST, "%s", details[fault]);
+	refuse_line(connection, socket, &problem);
+}
+
 static void refuse(struct MHD_Connection *connection, struct connection *socket, unsigned status)
 {
 	struct request *request = connection_request(socket);
 	if (!request) {
 		struct problem problem = {0};
 		state_problem(&problem, status, false);
-		response_write_problem_past(connection, socket, &problem);
+		refuse_line(connection, socket, &problem);
 		return;
 	}
 	request->connection = connection;

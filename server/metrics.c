@@ -247,7 +247,7 @@ static void write_requests(struct text *text, const struct metrics *metrics)
 
 static void write_answers(struct text *text, const struct metrics *metrics)
 {
-	write_family(text, "response_bytes", "counter", "Bytes of the bodies of answers, by route.");
+	write_family(text, "response_bytes", "counter", "Bytes of the bodies of answers, those that were delivered, by route.");
 	for (int route = 0; route < ROUTE_COUNT; route++)
 		text_printf(text, "stratus_response_bytes_total{route=\"%s\"} %llu\n", route_names[route],
 			    (unsigned long long)metrics->bytes[route]);

@@ -57,7 +57,7 @@ struct metrics;
 struct metrics *metrics_create(void);
 void metrics_destroy(struct metrics *metrics);
 
-/* status: of HTTP; 499 when the client left before an answer. bytes: of the answer's body. */
+/* status: of HTTP; 499 when the client left before the answer was whole. bytes: of the answer's body, those that were delivered. */
 void metrics_count_request(struct metrics *metrics, enum metrics_route route, unsigned status, double milliseconds, uint64_t bytes);
 /* An answer that is a problem. */
 void metrics_count_problem(struct metrics *metrics, enum problem_kind kind);

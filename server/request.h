@@ -19,6 +19,9 @@
 
 enum { REQUEST_ID_SIZE = 129, REQUEST_TIMEOUT_MS_MAX = 3600000 };
 
+/* In the log and among the counters, as nginx has it: who asked left before the answer was whole. */
+enum { STATUS_CLIENT_LEFT = 499 };
+
 struct request;
 struct service;
 
@@ -55,6 +58,9 @@ struct request {
 	unsigned retry_after_s;  /* when the key may have more */
 	unsigned status;         /* answered; 0: not yet */
 	uint64_t bytes;          /* of the answer's body */
+	bool is_past;            /* the answer was written past libmicrohttpd */
+	uint64_t sent_before;    /* bytes that the connection had carried before that body */
+	unsigned cut_status;     /* of an answer whose client left in the middle of it; 0: none did */
 	size_t memory_bytes;     /* of an answer of its own (admission.h) */
 	double late_ms;          /* of a request that is refused for it: so much later than it may be */
 	char scene[DIGEST_SIZE]; /* hash of the canonical scene that is asked for, for the log; empty: none */

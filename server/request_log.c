@@ -36,6 +36,8 @@ static void write_json(struct text *text, const struct request *request, const c
 	add_json_member(text, "method", request->method);
 	add_json_member(text, "path", path);
 	text_printf(text, ",\"status\":%u,\"duration_ms\":%.3f,\"bytes\":%llu", status, milliseconds, (unsigned long long)request->bytes);
+	if (request->cut_status)
+		text_printf(text, ",\"cut\":%u", request->cut_status);
 	if (*request->key)
 		add_json_member(text, "key", request->key);
 	if (*request->scene)
@@ -78,6 +80,8 @@ static void write_text(struct text *text, const struct request *request, const c
 	add_text_value(text, "method", request->method);
 	add_text_value(text, "path", path);
 	text_printf(text, " status=%u duration_ms=%.3f bytes=%llu", status, milliseconds, (unsigned long long)request->bytes);
+	if (request->cut_status)
+		text_printf(text, " cut=%u", request->cut_status);
 	if (*request->key)
 		add_text_value(text, "key", request->key);
 	if (*request->scene)

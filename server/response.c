@@ -51,9 +51,16 @@ static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size
 	return MHD_CONTENT_READER_END_OF_STREAM;
 }
 
-struct MHD_Response *response_create_unsized(void)
+struct MHD_Response *response_create_unsized(struct request *request)
 {
-	return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1024, read_nothing, NULL, NULL);
+	struct MHD_Response *response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1024, read_nothing, NULL, NULL);
+	request->closes = true;
+	if (response && MHD_set_response_options(response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END) == MHD_YES)
+		return response;
+	log_error("response_create_unsized: out of memory");
+	if (response)
+		MHD_destroy_response(response);
+	return NULL;
 }
 
 void response_set(struct MHD_Response *response, const char *name, const char *value)
@@ -74,6 +81,23 @@ static void keep_private(const struct request *request, struct MHD_Response *res
 		response_set(response, "Cache-Control", CACHE_KEEP_PRIVATE);
 }
 
+static enum MHD_Result add_header_size(void *sum, enum MHD_ValueKind kind, const char *name, const char *value)
+{
+	(void)kind;
+	*(uint64_t *)sum += strlen(name) + strlen(value) + sizeof ": \r\n" - 1;
+	return MHD_YES;
+}
+
+/* Bytes before the body, as libmicrohttpd writes them: its own headers are a date, a length and now and then what becomes of the
+ * connection, which is left out. */
+static uint64_t head_size(unsigned status, struct MHD_Response *response)
+{
+	static const char own[] = "HTTP/1.1 200 \r\nDate: Sun, 06 Nov 1994 08:49:37 GMT\r\nContent-Length: 1000000\r\n\r\n";
+	uint64_t size = sizeof own - 1 + strlen(MHD_get_reason_phrase_for(status));
+	MHD_get_response_headers(response, add_header_size, &size);
+	return size;
+}
+
 enum MHD_Result response_send(struct request *request, unsigned status, struct MHD_Response *response)
 {
 	if (!response)
@@ -86,8 +110,9 @@ enum MHD_Result response_send(struct request *request, unsigned status, struct M
 	response_set(response, "X-Request-Id", request->id);
 	if (request->closes || connection_is_surplus(request->socket))
 		response_set(response, "Connection", "close");
-	if (!request->is_accepted)
+	if (!request->is_accepted || request->closes)
 		connection_linger(request->socket);
+	request->sent_before = connection_written(request->socket) + head_size(status, response);
 	connection_work(request->socket);
 	enum MHD_Result result = library_queue_response(request->connection, status, response);
 	MHD_destroy_response(response);
@@ -228,19 +253,12 @@ enum MHD_Result response_send_problem_past(struct request *request)
 	if (origin)
 		text_printf(&headers, "Access-Control-Allow-Origin: %s\r\nVary: Origin\r\n", origin);
 	char *body = problem_to_json(&request->problem, request->id, 0);
+	request->is_past = true;
 	if (body && !headers.failed && write_past(request->connection, request->socket, status, headers.data, body))
 		request->status = status, request->bytes = strlen(body);
 	free(body);
 	text_finish(&headers);
 	return MHD_NO;
-}
-
-void response_write_problem_past(struct MHD_Connection *connection, struct connection *socket, const struct problem *problem)
-{
-	char *body = problem_to_json(problem, NULL, 0);
-	if (body)
-		write_past(connection, socket, problem_status(problem->kind), "", body);
-	free(body);
 }
 
 void response_end_past(struct MHD_Connection *connection)

@@ -12,13 +12,17 @@
 #define CACHE_ASK  "no-cache"
 #define CACHE_NONE "no-store"
 
+/* What is wrong with a request whose client ended in the middle of it. */
+#define REQUEST_CUT "The connection ended before the request did."
+
 /* The answer to a request. Takes over malloc'd data (also on failure). NULL when out of memory. */
 struct MHD_Response *response_create(struct request *request, char *data, size_t size);
 /* Likewise of an image that others hold too. Takes over one hold of it. */
 struct finished_image;
 struct MHD_Response *response_create_shared(struct request *request, struct finished_image *image);
-/* For a HEAD that is answered without computing, so that the length is unknown. */
-struct MHD_Response *response_create_unsized(void);
+/* For a HEAD that is answered without computing, so that the length is unknown. The connection is closed behind it: to keep it
+ * libmicrohttpd (0.9.75) would send chunks, whose end it writes although a HEAD has no body, and which the next answer would begin with. */
+struct MHD_Response *response_create_unsized(struct request *request);
 void response_set(struct MHD_Response *response, const char *name, const char *value);
 
 /* Sends with the headers every answer has; the response is given up in any case. NULL answers nothing. */
@@ -37,8 +41,6 @@ enum MHD_Result response_send_json(struct request *request, unsigned status, jso
 /* Sends request->problem where libmicrohttpd takes no response: while a body is still coming in, or for what it cannot read. The answer is
  * written to the socket. MHD_NO: the connection closes, and what the client still sends is read for a while (lingering.h). */
 enum MHD_Result response_send_problem_past(struct request *request);
-/* Likewise a problem of what is no request, so that nothing is counted. */
-void response_write_problem_past(struct MHD_Connection *connection, struct connection *socket, const struct problem *problem);
 /* Nothing that libmicrohttpd writes from here on is sent. */
 void response_end_past(struct MHD_Connection *connection);
 /* 413 while a body of more than `limit` bytes is still coming in. */

@@ -12,6 +12,7 @@ import pytest
 from conftest import in_some_try, wait_for
 
 SMALL = {"output": {"width": 32, "height": 24}}
+SEEDS = itertools.count(700)  # of pictures that nobody else asks for
 STAGES = ["queue", "optics", "sky", "field", "radiosity", "view", "readback", "encode", "total"]
 
 
@@ -155,6 +156,54 @@ def test_head_renders_nothing(daemon):
     fetched = daemon.get(target)
     for name in ("ETag", "Content-Type", "Vary", "Content-Location", "X-Scene-Key", "Cache-Control"):
         assert answer.headers[name] == fetched.headers[name]
+
+
+COMPUTED = ["/v1/render?output.width=32&output.height=24&clouds.seed=%d", "/v1/optics", "/v1/slab?optical_thickness=8&sun_zenith_deg=60", "/v1/sky"]
+
+
+def read_head(client):
+    head = b""
+    while not head.endswith(b"\r\n\r\n"):
+        head += (byte := client.recv(1))
+        assert byte
+    return head
+
+
+@pytest.mark.parametrize("version", [b"1.1", b"1.0"])
+@pytest.mark.parametrize("target", [*COMPUTED, "/v1/sun", "/v1/presets", "/", "/nothing", "/openapi.yaml"])
+def test_nothing_follows_the_headers_of_a_head(daemon, target, version):
+    """Byte for byte: what comes behind them would begin the next answer. Two HEADs and a GET, for as long as the connection is kept."""
+    target = target.replace("%d", str(next(SEEDS))).encode()
+    kept = 0
+    with socket.create_connection(("127.0.0.1", daemon.port), timeout=180) as client:
+        for method, asked in ((b"HEAD", target), (b"HEAD", target), (b"GET", b"/healthz")):
+            client.sendall(method + b" " + asked + b" HTTP/" + version + b"\r\nHost: x\r\n\r\n")
+            head = read_head(client)
+            assert head.startswith(b"HTTP/1.1 ") and b"Transfer-Encoding" not in head
+            if b"Connection: close" in head or version == b"1.0":
+                break
+            kept += 1
+        if method == b"HEAD":
+            assert client.recv(100) == b""
+    if version == b"1.1":
+        assert kept == (0 if head.startswith(b"HTTP/1.1 200 ") and method == b"HEAD" else 3)
+
+
+@pytest.mark.parametrize("target", COMPUTED)
+def test_a_get_behind_a_head(daemon, target):
+    """As a client does it that keeps its connections where it may; and what it asks for has all of its bytes."""
+    target = target.replace("%d", str(next(SEEDS)))
+    connection = daemon.connect()
+    tags = []
+    for method in ("HEAD", "GET", "HEAD", "GET"):
+        connection.request(method, target)
+        answer = connection.getresponse()
+        body = answer.read()
+        assert answer.status == 200 and bool(body) == (method == "GET")
+        assert method == "HEAD" or len(body) == int(answer.headers["Content-Length"])
+        tags.append(answer.headers["ETag"])
+    assert len(set(tags)) == 1
+    connection.close()
 
 
 def test_documents_are_conditional(daemon):

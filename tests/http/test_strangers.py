@@ -3,6 +3,7 @@ refused, and no refusal costs more than it must."""
 import http.client
 import json
 import re
+import socket
 import ssl
 import time
 
@@ -56,8 +57,19 @@ def check_refusal(answer, status):
 # --- what the library that speaks HTTP does not understand ----------------------------------------------------------------------------
 
 CHUNKED = POST + b"Transfer-Encoding: chunked\r\n\r\n"
-# (what is sent, status, type, a word of the detail, whether it had an address and so has an id and a line in the log)
+# (what is sent, status, type, a word of the detail, whether it had an address, which the log names)
 UNREADABLE = {
+    # No request begins like these: some of them would be waited for until the time for a request is over.
+    "one word": (b"hello\r\n\r\n", 400, "bad-request", "method", False),
+    "one word, unfinished": (b"hello\r", 400, "bad-request", "method", False),
+    "a method alone": (b"GET\r\n\r\n", 400, "bad-request", "method", False),
+    "a blank before it": (b" GET /sunny HTTP/1.1\r\n" + HOST + b"\r\n", 400, "bad-request", "method", False),
+    "zeros": (bytes(3), 400, "bad-request", "method", False),
+    "zeros behind empty lines": (b"\r\n\n\0\1\2\r\n\r\n", 400, "bad-request", "method", False),
+    "a method that is no token": (b"G(T /sunny HTTP/1.1\r\n" + HOST + b"\r\n", 400, "bad-request", "method", False),
+    "a zero in the address": (b"GET /healthz\0sunny HTTP/1.1\r\n" + HOST + b"\r\n", 400, "bad-request", "control", False),
+    "TLS": (bytes.fromhex("16030100c8010000c40303"), 400, "bad-request", "TLS", False),
+    "TLS with ends of lines": (bytes.fromhex("16030100c8010000c40303") + bytes(200) + b"\r\n\r\n", 400, "bad-request", "TLS", False),
     "no version": (b"GET /sunny\r\n\r\n", 400, "bad-request", "request line", False),
     "version 9": (b"GET /sunny HTTP/9.9\r\n" + HOST + b"\r\n", 505, "http-version-not-supported", "HTTP/1.1", False),
     "version 2": (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 505, "http-version-not-supported", "HTTP/1.1", False),
@@ -86,20 +98,101 @@ UNREADABLE = {
 def test_what_cannot_be_read(daemon, sent, status, kind, word, has_address):
     problem = check_refusal(ask(daemon, sent), status)
     assert problem["type"] == f"urn:stratus:problem:{kind}" and word in problem["detail"]
-    assert ("request_id" in problem) == has_address
-    if has_address:
-        line = f" id={problem['request_id']} "
-        assert wait_for(lambda: line in daemon.log.read_text())
-        (line,) = [found for found in daemon.log.read_text().splitlines() if line in found]
-        assert f" status={status} " in line
+    line = f" id={problem['request_id']} "
+    assert wait_for(lambda: any(line in found for found in daemon.lines))
+    (line,) = [found for found in daemon.lines if line in found]
+    assert f" status={status} " in line and f" problem={kind}" in line
+    assert (" method=- path=- " in line) == (not has_address)
     assert daemon.get("/healthz").status == 200
 
 
 def test_it_is_counted(narrow):
     """Nobody else's headers are too large for this daemon."""
-    ask(narrow, UNREADABLE["many cookies"][0])
-    names = 'stratus_requests_total{route="other",status="431"}', 'stratus_problems_total{type="headers-too-large"}'
-    assert wait_for(lambda: [narrow.metric(name) for name in names] == [1, 1])
+    for sent, status, kind in (("many cookies", 431, "headers-too-large"), ("version 9", 505, "http-version-not-supported"), ("zeros", 400, "bad-request")):
+        names = f'stratus_requests_total{{route="other",status="{status}"}}', f'stratus_problems_total{{type="{kind}"}}'
+        before = [narrow.settled(name) for name in names]
+        ask(narrow, UNREADABLE[sent][0])
+        assert wait_for(lambda: [narrow.metric(name) for name in names] == [count + 1 for count in before])
+
+
+def answer_on(client):
+    """The head of an answer and its body, of which it says the length."""
+    answer = b""
+    while b"\r\n\r\n" not in answer:
+        answer += client.recv(1)
+    size = int(headers_of(answer)["content-length"])
+    while size > 0:
+        answer += (piece := client.recv(size))
+        size -= len(piece)
+        assert piece
+    return answer
+
+
+@pytest.mark.parametrize("name", ["one word", "zeros", "a blank before it", "TLS"])
+def test_it_is_answered_on_a_kept_connection(daemon, name):
+    """Behind questions with a body and without one, and after empty lines."""
+    questions = b"GET /healthz HTTP/1.1\r\n" + HOST + b"\r\n", b"\r\n" + POST + b"Content-Length: 1\r\n\r\n{"
+    with connect(daemon) as client:
+        for question, status in zip(questions, (200, 400)):
+            client.sendall(question)
+            assert status_of(answer_on(client)) == status
+        sent, status, kind, word, _ = UNREADABLE[name]
+        client.sendall(sent)
+        assert word in check_refusal(read_all(client), status)["detail"]
+
+
+def test_a_first_line_in_pieces(daemon):
+    """Byte by byte it is the line that it is, and one that is none is refused at its first wrong byte."""
+    with connect(daemon) as client:
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for byte in b"\r\nGET /healthz HTTP/1.1\r\n" + HOST + b"\r\n":
+            client.sendall(bytes([byte]))
+            daemon.await_reading(client)
+        assert status_of(answer_on(client)) == 200
+    with connect(daemon) as client:
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for byte in b"GET":
+            client.sendall(bytes([byte]))
+            daemon.await_reading(client)
+        client.sendall(b"\t")
+        check_refusal(read_all(client), 400)
+
+
+TRUNCATED = {
+    "in the request line": b"GET /heal",
+    "in the headers": POST,
+    "in the body": POST + b"Content-Length: 100\r\n\r\n{",
+    "before the body": POST + b"Content-Length: 100\r\n\r\n",
+    "in a chunk": POST + b"Transfer-Encoding: chunked\r\n\r\n5\r\n{",
+    "before the last chunk": POST + b"Transfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n",
+    "in an upload": b"PUT /v1/assets/part HTTP/1.1\r\n" + HOST + b"Content-Length: 100\r\n\r\n\x89PNG",
+}
+
+
+@pytest.mark.parametrize("sent", TRUNCATED.values(), ids=TRUNCATED.keys())
+def test_who_ends_in_the_middle_hears_so(daemon, sent):
+    """At once, and not when the time for a request is over; whether the end comes with the last bytes or behind them."""
+    for waits in (False, True) * 3:
+        with connect(daemon) as client:
+            client.sendall(sent)
+            if waits:
+                daemon.await_reading(client)
+            client.shutdown(socket.SHUT_WR)
+            answer = read_all(client)
+        problem = check_refusal(answer, 400)
+        assert problem["type"] == "urn:stratus:problem:bad-request" and "ended" in problem["detail"]
+        line = f" id={problem['request_id']} "
+        assert wait_for(lambda: any(line in found and " status=400 " in found for found in daemon.lines))
+    assert daemon.get("/v1/assets/part").status == 404
+
+
+def test_half_closed_and_whole(daemon):
+    """Who asks all of it and closes the sending half then is answered where nothing need be waited for."""
+    for _ in range(5):
+        with connect(daemon) as client:
+            client.sendall(b"GET /healthz HTTP/1.1\r\n" + HOST + b"\r\n")
+            client.shutdown(socket.SHUT_WR)
+            assert status_of(read_all(client)) == 200
 
 
 def test_it_is_answered_behind_others(daemon):
@@ -123,7 +216,7 @@ def test_over_tls(tmp_path_factory):
             return read_all(client)
 
     try:
-        for name in ("no colon", "length is a word", "chunk is a word"):
+        for name in ("no colon", "length is a word", "chunk is a word", "one word", "zeros", "no version"):
             sent, status, kind, _, _ = UNREADABLE[name]
             assert check_refusal(ask_in_private(sent), status)["type"].endswith(kind)
         large = POST + b"Content-Length: %d\r\n\r\n" % LARGE + bytes(LARGE)

@@ -16,6 +16,7 @@ struct config {
 	int queue_length;     /* 1..65536 */
 	int workers;          /* 1..256; 0: as many as processors */
 	int timeout_ms;       /* 1..3600000, when a request says none */
+	int drain_s;          /* 0..3600; for accepted work at the end */
 	int cache_mb;         /* 1..1048576 */
 	int droplets_mb;      /* 16..1048576 */
 	int droplets_disk_mb; /* 0..16777216; 0: nothing is kept on disk */

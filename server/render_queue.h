@@ -15,6 +15,7 @@ enum render_outcome {
 	RENDER_OUTCOME_ABANDONED /* nobody waits for it any more */,
 	RENDER_OUTCOME_NO_MEMORY, /* this scene is too large for the device as it is loaded; others may do */
 	RENDER_OUTCOME_FAILED,
+	RENDER_OUTCOME_STOPPED,    /* of a wait (call.h): a shutdown gave it up */
 	RENDER_OUTCOME_UNAVAILABLE /* there is no renderer any more, or another device than before */
 };
 

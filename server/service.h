@@ -68,7 +68,7 @@ struct service {
 	_Atomic bool ready;          /* has been ready to render */
 	_Atomic bool stopping;       /* takes no new work */
 	_Atomic bool abandoned;      /* since there is no renderer any more */
-	_Atomic bool giving_up;      /* drops the accepted work too */
+	_Atomic bool giving_up;      /* drops the accepted work too, since the time for it is over */
 };
 
 /* Starts serving; rendering comes up behind. NULL (and a log line) on failure, such as an address in use. Main thread. */
@@ -77,7 +77,8 @@ struct service *service_create(const struct config *config);
 /* Waits until the service can render, at most so long. SERVICE_STARTING: not yet. Main thread. */
 enum service_state service_wait(struct service *service, int milliseconds);
 
-/* Takes no new work, finishes what was accepted (within a bound), stops all threads, frees everything. Takes NULL. Main thread. */
+/* Takes no new work, finishes what was accepted, within --drain-s, and refuses the rest of it; stops all threads, frees everything. Takes
+ * NULL. Main thread. */
 void service_destroy(struct service *service);
 
 /* The renderer hangs or cannot be had any more: answers what can be answered without it, for at most some seconds. Nothing is freed, and

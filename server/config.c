@@ -72,7 +72,7 @@ static const struct option options[] = {
 	 OPTION_INTEGER, AT(cache_mb), .low = 1, .high = 1048576},
 	{"--recycle-mb", "STRATUS_RECYCLE_MB", "MB", "growth of memory, beside the caches, after which the renderer is made anew; 0: never",
 	 OPTION_INTEGER, AT(recycle_mb), .low = 0, .high = 16777216},
-	{"--golden-s", "STRATUS_GOLDEN_S", "S", "idleness after which the renderer proves that it renders; 0: at the start alone",
+	{"--golden-s", "STRATUS_GOLDEN_S", "S", "between two proofs that the renderer renders, when idle, and four times as long at most; 0: at the start alone",
 	 OPTION_INTEGER, AT(golden_s), .low = 0, .high = 86400},
 	{"--hang-ms", "STRATUS_HANG_MS", "MS", "without progress of the renderer after which the daemon ends, to be started anew",
 	 OPTION_INTEGER, AT(hang_ms), .low = 100, .high = 3600000},

@@ -31,7 +31,7 @@ struct config {
 	const char *tls_cert; /* PEM; both or neither */
 	const char *tls_key;
 	const char *cors_origins; /* as cors.h has them; NULL: none */
-	int golden_s;             /* 0..86400; of idleness between golden renders, 0: none but at the start */
+	int golden_s;             /* 0..86400; between golden renders, 0: none but at the start */
 	int hang_ms;              /* 100..3600000; without progress of the renderer */
 	int recycle_mb;           /* 0..16777216; growth of memory; 0: any */
 	int log_level;            /* enum log_level */

@@ -8,6 +8,7 @@
  *   poison         WIDTH, as long as the link exists: the driver reports a reset after each texture of that width
  *   gl-error       the next question for errors is answered with one
  *   gl-memory      OpenGL has no memory for the next texture
+ *   gl-full        WIDTH, as long as the link exists: OpenGL has no memory for textures wider than that
  *   host-memory    BYTES: the next allocation of at least so many fails
  *   shader         the driver takes the next shader for one that does not compile
  *   hang           S: the next pass holds the thread up for so many seconds
@@ -81,7 +82,7 @@ static void EPOXY_CALLSPEC faulty_glTextureStorage2D(GLuint texture, GLsizei lev
 {
 	double number;
 	RESTORE(glTextureStorage2D);
-	if (find("gl-memory", &number, true))
+	if (find("gl-memory", &number, true) || (find("gl-full", &number, false) && width > (GLsizei)number))
 		memory_error = true;
 	else
 		real_glTextureStorage2D(texture, levels, format, width, height);

@@ -338,6 +338,8 @@ static void encode(struct work *base)
 	if (taken)
 		image = encode_frame(work);
 	wanted = image || !is_unwanted(work);
+	if (wanted)
+		encoder_care_note(&work->service->encoders, image != NULL);
 	work->is_kept = image && work->may_be_kept && image_cache_keep(work->service->finished, image);
 	work->job.encoded_ms = clock_now_ms() - start;
 	if (image)

@@ -127,6 +127,7 @@ static void drop_over(void *context)
 	preparation_drop_over(service->preparation);
 	worker_pool_sweep(service->decoders);
 	drop_wrong(service);
+	encoder_care_look(&service->encoders, service->images);
 }
 
 struct service *service_create(const struct config *config)
@@ -320,7 +321,8 @@ enum service_state service_state(const struct service *service)
 		return SERVICE_STOPPING;
 	if (!service->ready)
 		return SERVICE_STARTING;
-	return render_thread_state(service->render_thread) == RENDER_THREAD_RECOVERING ? SERVICE_RECOVERING : SERVICE_READY;
+	const bool recovers = render_thread_state(service->render_thread) == RENDER_THREAD_RECOVERING;
+	return recovers || encoder_care_is_broken(&service->encoders) ? SERVICE_RECOVERING : SERVICE_READY;
 }
 
 size_t service_queue_depth(const struct service *service)

@@ -247,6 +247,21 @@ def test_no_memory_for_small_pictures(faulty):
     assert faulty.render({"sun": {"elevation_deg": 61}, "output": SMALL}).status == 200
 
 
+def test_pictures_that_cannot_be_written(faulty):
+    """Not ready once three could not on end, by itself ready again when one can."""
+    scene = {"clouds": {"seed": 6200}, "output": SMALL}
+    faulty.fail("encode")
+    assert [faulty.render(scene).status for _ in range(2)] == [500] * 2
+    assert faulty.is_ready()
+    assert faulty.render(scene).status == 500
+    assert wait_for(lambda: not faulty.is_ready())
+    assert faulty.get("/readyz").json["status"] == "recovering"
+    assert faulty.get("/healthz").status == 200 and faulty.render(scene).status == 500
+    faulty.heal("encode")
+    assert wait_for(faulty.is_ready)
+    assert faulty.render(scene).status == 200
+
+
 # --- a shader that is compiled when it is needed ---------------------------------------------------------------------------------------
 
 

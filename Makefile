@@ -91,7 +91,7 @@ $(B)/stratusd: $(call obj,server/main.c) $(B)/libserver.a $(B)/librenderer.a
 	$(CC) $(LDFLAGS) $^ -o $@ $(SERVER_LIBS) $(RENDERER_LIBS)
 # For tests: the same with a GPU, a driver and a memory that can be told to fail (tests/faults/faults.c).
 $(B)/stratusd-faulty: $(call obj,server/main.c tests/faults/faults.c) $(B)/libserver.a $(B)/librenderer.a
-	$(CC) $(LDFLAGS) -Wl,--wrap=config_parse,--wrap=malloc $^ -o $@ $(SERVER_LIBS) $(RENDERER_LIBS)
+	$(CC) $(LDFLAGS) -Wl,--wrap=config_parse,--wrap=malloc,--wrap=image_module_load $^ -o $@ $(SERVER_LIBS) $(RENDERER_LIBS)
 $(B)/stratus: $(call obj,$(CLIENT_SRC))
 	$(CC) $(LDFLAGS) $^ -o $@ $(CLIENT_LIBS) -lm
 $(B)/render-bench: $(call obj,renderer/programs/bench.c) $(B)/librenderer.a

@@ -14,13 +14,16 @@ static const double tolerance = 0.02;
 /* A picture of less contrast than this, of full scale between its darkest and brightest block, shows nothing. */
 static const double contrast_min = 0.05;
 
-/* The scene of the renderer's own warm-up, so that it shares what that left. Each time the camera turns by a millionth of a degree, which
- * no pixel shows: else the view would be remembered, and say nothing of the device. */
-static struct scene golden_scene(void)
+/* The scene of the renderer's own warm-up, so that it shares what that left. Each time the camera turns by a millionth of a degree, and
+ * the sun goes up by one with a new sky, which no pixel shows: else the view would be remembered, and say nothing of the device. */
+static struct scene golden_scene(bool with_sky)
 {
-	static _Atomic unsigned turn;
+	static _Atomic unsigned turns;
+	const double moved_deg = 1e-6 * (1 + turns++ % 4096);
 	struct scene scene = scene_default();
-	scene.camera.azimuth_deg += 1e-6 * (1 + turn++ % 4096);
+	scene.camera.azimuth_deg += moved_deg;
+	if (with_sky)
+		scene.sun.elevation_deg += moved_deg;
 	scene.output.width = GOLDEN_COLUMNS * GOLDEN_BLOCK;
 	scene.output.height = GOLDEN_ROWS * GOLDEN_BLOCK;
 	return scene;
@@ -47,9 +50,10 @@ static bool shows_something(const struct golden_picture *picture)
 	return high - low >= contrast_min * 255;
 }
 
-enum golden_result golden_render(struct renderer *renderer, renderer_cancelled *cancelled, void *context, struct golden_picture *picture)
+enum golden_result golden_render(struct renderer *renderer, bool with_sky, renderer_cancelled *cancelled, void *context,
+				 struct golden_picture *picture)
 {
-	const struct scene scene = golden_scene();
+	const struct scene scene = golden_scene(with_sky);
 	struct frame frame;
 	const enum render_result result = renderer_render(renderer, &scene, cancelled, context, &frame);
 	if (result == RENDER_CANCELLED)

@@ -22,8 +22,10 @@ extern const struct golden_picture golden_expected;
 
 enum golden_result { GOLDEN_PASSED, GOLDEN_FAILED, GOLDEN_CANCELLED };
 
-/* Renders it anew and, where it comes out, gives what it is. As renderer_render. GOLDEN_FAILED: it does not come out, or is one colour. */
-enum golden_result golden_render(struct renderer *renderer, renderer_cancelled *cancelled, void *context, struct golden_picture *picture);
+/* Renders it anew and, where it comes out, gives what it is. with_sky: what is remembered of its sky does not count either, so that memory
+ * must be had for a new one. As renderer_render. GOLDEN_FAILED: it does not come out, or is one colour. */
+enum golden_result golden_render(struct renderer *renderer, bool with_sky, renderer_cancelled *cancelled, void *context,
+				 struct golden_picture *picture);
 
 /* Is it what is expected? else a log line says how far it is from that. */
 bool golden_compare(const struct golden_picture *picture, const struct golden_picture *expected);

@@ -122,6 +122,15 @@ static bool is_idle(const struct service *service)
 	return service_queue_depth(service) == 0 && render_thread_busy_ms(service->render_thread) == 0;
 }
 
+static void refuse_late(struct request *request, double finish_ms, double left_ms)
+{
+	request->problem.predicted_ms = finish_ms;
+	note_queue(request);
+	problem_set(&request->problem, PROBLEM_PREDICTED_LATE,
+		    "The answer would take about %.0f ms, and %.0f ms are left until the deadline (X-Timeout-Ms).", finish_ms, left_ms);
+	metrics_count_rejection(request->service->metrics, REJECTED_LATE);
+}
+
 static bool is_in_time(struct request *request, const struct cost *cost, double deadline_ms)
 {
 	struct service *service = request->service;
@@ -132,12 +141,25 @@ static bool is_in_time(struct request *request, const struct cost *cost, double 
 	/* What is late already is answered so, with 504. */
 	if (finish_ms <= left_ms || left_ms <= 0 || is_idle(service))
 		return true;
-	request->problem.predicted_ms = finish_ms;
-	note_queue(request);
 	request->late_ms = alone_ms < left_ms ? finish_ms - left_ms : 0;
-	problem_set(&request->problem, PROBLEM_PREDICTED_LATE,
-		    "The answer would take about %.0f ms, and %.0f ms are left until the deadline (X-Timeout-Ms).", finish_ms, left_ms);
-	metrics_count_rejection(service->metrics, REJECTED_LATE);
+	refuse_late(request, finish_ms, left_ms);
+	return false;
+}
+
+bool admission_join(struct request *request, unsigned long flight, const struct scene *scene, double deadline_ms)
+{
+	struct service *service = request->service;
+	const double left_ms = deadline_ms - clock_now_ms();
+	double ahead_ms, own_ms;
+	if (!render_queue_foresee(service->queue, flight, request->client, &ahead_ms, &own_ms))
+		return true;
+	const struct cost cost = cost_model_predict(service->costs, scene, NULL, false);
+	const double pace = cost_model_pace(service->costs);
+	const double finish_ms = pace * ahead_ms + (cost.fresh ? pace * own_ms + cost.encode_ms : 0);
+	if (finish_ms <= left_ms || left_ms <= 0)
+		return true;
+	request->late_ms = finish_ms - left_ms; /* what is finished by then is kept */
+	refuse_late(request, finish_ms, left_ms);
 	return false;
 }
 

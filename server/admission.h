@@ -29,6 +29,10 @@ struct promise {
 bool admission_enter(struct request *request, struct promise *promise, const struct scene *const *scenes, int count,
 		     const struct sky_directions *directions, double deadline_ms);
 
+/* Whether a request may wait for the picture that others have in work, by the number of their flight: it takes nothing, so that its
+ * deadline alone counts. On false request->problem says why not. HTTP thread. */
+bool admission_join(struct request *request, unsigned long flight, const struct scene *scene, double deadline_ms);
+
 /* The work has ended, before its request hears of it, with what was asked for or without. Once or more; any thread. */
 void admission_leave(struct service *service, struct promise *promise, bool answered);
 

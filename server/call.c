@@ -58,14 +58,19 @@ enum call_outcome call_reason_to_stop(const struct request *request, double dead
 	return request_is_abandoned(request) ? CALL_ABANDONED : CALL_OK;
 }
 
-static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,
-					[RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
-					[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED,
-					[RENDER_OUTCOME_FAILED] = ENDED_FAILED,
-					[RENDER_OUTCOME_UNAVAILABLE] = ENDED_FAILED};
+static const enum metrics_end ends[] = {[RENDER_OUTCOME_EXPIRED] = ENDED_EXPIRED,  [RENDER_OUTCOME_ABANDONED] = ENDED_ABANDONED,
+					[RENDER_OUTCOME_NO_MEMORY] = ENDED_FAILED, [RENDER_OUTCOME_FAILED] = ENDED_FAILED,
+					[RENDER_OUTCOME_STOPPED] = ENDED_STOPPED,  [RENDER_OUTCOME_UNAVAILABLE] = ENDED_FAILED};
 
-void call_end_wait(struct request *request, enum render_outcome outcome)
+/* Work is dropped for two reasons, and only its client can tell them apart: it is gone, or a shutdown gives up what it waits for. */
+static enum render_outcome outcome_for(const struct request *request, enum render_outcome outcome)
 {
+	return outcome == RENDER_OUTCOME_ABANDONED && !request_is_abandoned(request) ? RENDER_OUTCOME_STOPPED : outcome;
+}
+
+void call_end_wait(struct request *request, enum render_outcome waited)
+{
+	const enum render_outcome outcome = outcome_for(request, waited);
 	if (outcome != RENDER_OUTCOME_OK)
 		metrics_count_end(request->service->metrics, ends[outcome]);
 	request_resume(request);
@@ -73,12 +78,13 @@ void call_end_wait(struct request *request, enum render_outcome outcome)
 
 void call_count_render(struct service *service, const struct render_job *job)
 {
+	const bool is_stopped = job->outcome == RENDER_OUTCOME_ABANDONED && service->giving_up;
 	log_debug("%.1f ms of the renderer were predicted, it took %.1f", job->predicted_ms, job->spent_ms);
 	if (job->outcome != RENDER_OUTCOME_OK)
-		metrics_count_waste(service->metrics, ends[job->outcome], job->spent_ms + job->encoded_ms);
+		metrics_count_waste(service->metrics, is_stopped ? ENDED_STOPPED : ends[job->outcome], job->spent_ms + job->encoded_ms);
 	else if (job->predicted_ms > 0)
 		metrics_count_prediction(service->metrics, job->spent_ms / job->predicted_ms);
-	if (job->outcome == RENDER_OUTCOME_ABANDONED)
+	if (job->outcome == RENDER_OUTCOME_ABANDONED && !is_stopped)
 		metrics_count_cancellation(service->metrics, job->phase);
 }
 
@@ -109,7 +115,7 @@ enum MHD_Result call_send_failure(struct request *request, enum call_outcome out
 	case CALL_ABANDONED:
 		return MHD_NO;
 	case CALL_STOPPED:
-		return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "The service is shutting down.");
+		return response_send_new_problem(request, PROBLEM_SHUTTING_DOWN, "%s was not done before the service shut down.", what);
 	case CALL_FAILED:
 	case CALL_OK:
 		break;
@@ -120,11 +126,13 @@ enum MHD_Result call_send_failure(struct request *request, enum call_outcome out
 
 enum MHD_Result call_send_render_failure(struct request *request, enum render_outcome outcome, const char *what, const char *size)
 {
-	switch (outcome) {
+	switch (outcome_for(request, outcome)) {
 	case RENDER_OUTCOME_EXPIRED:
 		return call_send_failure(request, CALL_EXPIRED, what);
 	case RENDER_OUTCOME_ABANDONED:
 		return call_send_failure(request, CALL_ABANDONED, what);
+	case RENDER_OUTCOME_STOPPED:
+		return call_send_failure(request, CALL_STOPPED, what);
 	case RENDER_OUTCOME_NO_MEMORY:
 		return response_send_new_problem(request, PROBLEM_NO_MEMORY, "The device has no memory for %s now.", size);
 	case RENDER_OUTCOME_UNAVAILABLE:

@@ -38,7 +38,7 @@ enum MHD_Result call_send_json(struct request *request, unsigned status, struct 
 /* CALL_OK: the answer is still wanted. */
 enum call_outcome call_reason_to_stop(const struct request *request, double deadline_ms);
 
-/* Does nobody wait for it any more? */
+/* Is nobody to wait for it any more: its client has gone, or a shutdown gives it up? */
 bool call_is_abandoned(const struct request *request);
 
 /* Counts the wait of one of several requests for one job, and resumes it; the job itself is counted once, by call_count_render. */

@@ -16,6 +16,7 @@ struct config {
 	int queue_length;     /* 1..65536 */
 	int workers;          /* 1..256; 0: as many as processors */
 	int timeout_ms;       /* 1..3600000, when a request says none */
+	int drain_s;          /* 0..3600; for accepted work at the end */
 	int cache_mb;         /* 1..1048576 */
 	int droplets_mb;      /* 16..1048576 */
 	int droplets_disk_mb; /* 0..16777216; 0: nothing is kept on disk */
@@ -30,7 +31,7 @@ struct config {
 	const char *tls_cert; /* PEM; both or neither */
 	const char *tls_key;
 	const char *cors_origins; /* as cors.h has them; NULL: none */
-	int golden_s;             /* 0..86400; of idleness between golden renders, 0: none but at the start */
+	int golden_s;             /* 0..86400; between golden renders, 0: none but at the start */
 	int hang_ms;              /* 100..3600000; without progress of the renderer */
 	int recycle_mb;           /* 0..16777216; growth of memory; 0: any */
 	int log_level;            /* enum log_level */

@@ -95,19 +95,23 @@ static double rank_of(double cost_ms, double now_ms)
 	return now_ms + FAIR_ORDER_PATIENCE * cost_ms;
 }
 
-void fair_order_add(struct fair_order *order, struct fair_entry *entry, double now_ms)
+static void link_entry(struct fair_order *order, struct fair_client *client, struct fair_entry *entry)
 {
-	struct fair_client *client = find_or_make(order, entry->client ? entry->client : "");
 	/* Who had nothing waiting has saved up nothing. */
 	if (!client->first)
 		client->start_ms = fmax(client->start_ms, order->virtual_ms);
 	entry->owner = client;
-	entry->rank = rank_of(entry->cost_ms, now_ms);
 	struct fair_entry **link = &client->first;
 	while (*link && (*link)->rank <= entry->rank)
 		link = &(*link)->next;
 	entry->next = *link;
 	*link = entry;
+}
+
+void fair_order_add(struct fair_order *order, struct fair_entry *entry, double now_ms)
+{
+	entry->rank = rank_of(entry->cost_ms, now_ms);
+	link_entry(order, find_or_make(order, entry->client ? entry->client : ""), entry);
 }
 
 static struct fair_entry *first_of(const struct fair_client *client, fair_wanted *wanted, void *context)
@@ -188,18 +192,67 @@ static double served_before(const struct fair_client *client, double start_ms)
 	return sum;
 }
 
+/* Where an entry stands or would stand: the virtual time at which it begins, and the cost of what its client has before it. */
+struct place {
+	double start_ms, own_ms;
+};
+
+static struct place new_place(const struct fair_order *order, const struct fair_client *own, double rank)
+{
+	struct place place = {own ? own->start_ms : order->virtual_ms, 0};
+	if (own && !own->first)
+		place.start_ms = fmax(place.start_ms, order->virtual_ms);
+	for (const struct fair_entry *entry = own ? own->first : NULL; entry && entry->rank <= rank; entry = entry->next)
+		place.own_ms += entry->cost_ms;
+	place.start_ms += place.own_ms;
+	return place;
+}
+
+static struct place present_place(const struct fair_entry *sought)
+{
+	struct place place = {0};
+	for (const struct fair_entry *entry = sought->owner->first; entry != sought; entry = entry->next)
+		place.own_ms += entry->cost_ms;
+	place.start_ms = sought->owner->start_ms + place.own_ms;
+	return place;
+}
+
+static double before(const struct fair_order *order, const struct fair_client *own, struct place place)
+{
+	double sum = place.own_ms;
+	for (const struct fair_client *client = order->clients; client; client = client->next)
+		if (client != own)
+			sum += served_before(client, place.start_ms);
+	return sum;
+}
+
 double fair_order_ahead_ms(const struct fair_order *order, const char *key, double cost_ms, double now_ms)
 {
 	const struct fair_client *own = find(order, key ? key : "");
-	double start_ms = own ? own->start_ms : order->virtual_ms, sum = 0;
-	if (own && !own->first)
-		start_ms = fmax(start_ms, order->virtual_ms);
-	const double rank = rank_of(cost_ms, now_ms);
-	for (const struct fair_entry *entry = own ? own->first : NULL; entry && entry->rank <= rank; entry = entry->next)
-		sum += entry->cost_ms;
-	start_ms += sum;
-	for (const struct fair_client *client = order->clients; client; client = client->next)
-		if (client != own)
-			sum += served_before(client, start_ms);
-	return sum;
+	return before(order, own, new_place(order, own, rank_of(cost_ms, now_ms)));
+}
+
+/* Is it served sooner when it comes to a client's line now? */
+static bool is_sooner(const struct fair_order *order, const struct fair_entry *entry, const struct fair_client *client, double now_ms)
+{
+	return client != entry->owner && new_place(order, client, rank_of(entry->cost_ms, now_ms)).start_ms < present_place(entry).start_ms;
+}
+
+double fair_order_ahead_of_ms(const struct fair_order *order, const struct fair_entry *entry, const char *key, double now_ms)
+{
+	const struct fair_client *client = find(order, key ? key : "");
+	if (is_sooner(order, entry, client, now_ms))
+		return before(order, client, new_place(order, client, rank_of(entry->cost_ms, now_ms)));
+	return before(order, entry->owner, present_place(entry));
+}
+
+bool fair_order_share(struct fair_order *order, struct fair_entry *entry, const char *key, double now_ms)
+{
+	if (!is_sooner(order, entry, find(order, key ? key : ""), now_ms))
+		return false;
+	unlink_entry(entry);
+	entry->client = key;
+	fair_order_add(order, entry, now_ms);
+	forget(order, false); /* whose line that was, when it is empty now */
+	return true;
 }

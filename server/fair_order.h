@@ -53,6 +53,13 @@ void fair_order_settle(struct fair_order *order, struct fair_entry *entry, doubl
 /* Leaves without having been served. */
 void fair_order_drop(struct fair_order *order, struct fair_entry *entry);
 
+/* Another client asks for what waits, too: it goes to the line where it is served first, and who has that line pays for it. false: it is
+ * where it was. */
+bool fair_order_share(struct fair_order *order, struct fair_entry *entry, const char *client, double now_ms);
+
+/* Cost of what will be served before an entry that waits, where it is or, when it is shared with this client, where it goes. */
+double fair_order_ahead_of_ms(const struct fair_order *order, const struct fair_entry *entry, const char *client, double now_ms);
+
 /* Cost of what would be served before an entry that came now, as far as anyone can know who does not know what will come. cost_ms INFINITY:
  * before the last of its client. */
 double fair_order_ahead_ms(const struct fair_order *order, const char *client, double cost_ms, double now_ms);

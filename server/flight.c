@@ -18,6 +18,7 @@ struct flights {
 	pthread_mutex_t mutex;
 	struct flight *first; /* those that others may join */
 	size_t open;
+	unsigned long opened; /* ever */
 };
 
 struct flights *flights_create(struct image_cache *cache)
@@ -67,6 +68,7 @@ static struct flight *find(const struct flights *flights, const char *tag)
 
 static void sit_down(struct flight *flight, struct flight_seat *seat)
 {
+	seat->flight = flight->number;
 	seat->next = flight->seats;
 	flight->seats = seat;
 	*flight->deadline_ms = fmax(*flight->deadline_ms, seat->deadline_ms);
@@ -77,6 +79,7 @@ static void open_flight(struct flights *flights, const char *tag, struct flight 
 	flight->flights = flights;
 	flight->deadline_ms = deadline_ms;
 	flight->is_listed = tag != NULL;
+	flight->number = ++flights->opened;
 	flights->open++;
 	if (!tag)
 		return;
@@ -154,6 +157,15 @@ enum flight_boarding flight_board(struct flights *flights, const char *tag, stru
 	}
 	pthread_mutex_unlock(&flights->mutex);
 	return boarding;
+}
+
+unsigned long flights_find(struct flights *flights, const char *tag)
+{
+	pthread_mutex_lock(&flights->mutex);
+	const struct flight *flight = find(flights, tag);
+	const unsigned long number = flight ? flight->number : 0;
+	pthread_mutex_unlock(&flights->mutex);
+	return number;
 }
 
 bool flight_is_wanted(struct flight *flight)

@@ -19,6 +19,7 @@ struct flight_seat {
 	void (*leave)(struct flight_seat *seat);
 
 	bool has_joined;              /* the flight of another */
+	unsigned long flight;         /* its number */
 	bool has_arrived;             /* the work has ended; else this seat was left before */
 	bool refused;                 /* the work was not accepted */
 	enum render_outcome outcome;  /* of the wait */
@@ -31,6 +32,7 @@ struct flight_seat {
 struct flight {
 	struct flights *flights;
 	char tag[ENTITY_TAG_SIZE];
+	unsigned long number;        /* from 1, never that of another */
 	bool is_listed;              /* others may join */
 	_Atomic double *deadline_ms; /* of the work: the latest of all seats that were ever taken */
 	struct flight_seat *seats;
@@ -58,6 +60,9 @@ enum flight_boarding {
  * that as others join. Both stay where they are until flight_close. */
 enum flight_boarding flight_board(struct flights *flights, const char *tag, struct flight *own, _Atomic double *deadline_ms,
 				  struct flight_seat *seat);
+
+/* Number of the flight that a seat would be taken in now; 0: there is none. */
+unsigned long flights_find(struct flights *flights, const char *tag);
 
 /* Is any seat taken still? Those whose deadline has passed or whose client has gone are left. Once false nobody joins any more: the work is
  * to be dropped. By one thread at a time, that of the work. */

@@ -75,7 +75,8 @@ static void tell(enum service_state state, double *told_ms)
 		*told_ms = clock_now_ms();
 	}
 	if (state != before)
-		supervisor_tell(state == SERVICE_RECOVERING ? "STATUS=The renderer is made anew." : "STATUS=Renders are taken.");
+		supervisor_tell(state == SERVICE_RECOVERING ? "STATUS=The renderer is made anew, or no picture can be written."
+							    : "STATUS=Renders are taken.");
 	before = state;
 }
 

@@ -20,7 +20,7 @@ static const char *const rejection_names[REJECTION_COUNT] = {"full",        "pix
 							     "connections", "starting", "shutting_down",  "unavailable"};
 static const char *const image_names[IMAGE_SOURCE_COUNT] = {
 	[IMAGE_FROM_CACHE] = "hit", [IMAGE_SHARED] = "shared", [IMAGE_MISSED] = "miss", [IMAGE_BYPASSED] = "bypass"};
-static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed"};
+static const char *const end_names[END_COUNT] = {"expired", "abandoned", "failed", "stopped"};
 static const char *const phase_names[RENDER_PHASE_COUNT] = {
 	[RENDER_PHASE_QUEUED] = "queued", [RENDER_PHASE_RENDERING] = "rendering", [RENDER_PHASE_ENCODING] = "encoding"};
 static const char *const source_names[DROPLET_SOURCE_COUNT] = {

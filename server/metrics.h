@@ -50,7 +50,7 @@ enum metrics_rejection {
 };
 /* Where the image of an answer came from. */
 enum metrics_image { IMAGE_FROM_CACHE, IMAGE_SHARED, IMAGE_MISSED, IMAGE_BYPASSED, IMAGE_SOURCE_COUNT };
-enum metrics_end { ENDED_EXPIRED, ENDED_ABANDONED, ENDED_FAILED, END_COUNT };
+enum metrics_end { ENDED_EXPIRED, ENDED_ABANDONED, ENDED_FAILED, ENDED_STOPPED, END_COUNT };
 
 struct metrics;
 

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 /* What is unknown counts for so much. */
@@ -18,6 +19,7 @@ struct render_queue {
 	struct render_queue_limits limits;
 	size_t depth;
 	double pixels, waiting_ms;
+	unsigned long running_flight;                         /* of the job that runs */
 	double running_ms, running_turn_ms, running_since_ms; /* predicted of the job that runs, 0: none does; and of its turn */
 	bool closed;
 };
@@ -157,6 +159,7 @@ static struct render_job *take(struct render_queue *queue, struct render_job *jo
 	if (!job)
 		return NULL;
 	count_out(queue, job);
+	queue->running_flight = job->flight;
 	queue->running_ms = remaining_ms(job);
 	queue->running_turn_ms = job->entry.cost_ms;
 	queue->running_since_ms = clock_now_ms();
@@ -200,6 +203,7 @@ void render_queue_settle(struct render_queue *queue, struct render_job *job, dou
 	pthread_mutex_lock(&queue->mutex);
 	fair_order_settle(queue->order, &job->entry, took_ms);
 	queue->running_ms = queue->running_turn_ms = 0;
+	queue->running_flight = 0;
 	pthread_mutex_unlock(&queue->mutex);
 }
 
@@ -213,6 +217,45 @@ struct render_job *render_queue_remove(struct render_queue *queue, render_job_wa
 	}
 	pthread_mutex_unlock(&queue->mutex);
 	return job;
+}
+
+static bool is_of_flight(struct fair_entry *entry, void *context)
+{
+	return job_of(entry)->flight == *(const unsigned long *)context;
+}
+
+void render_queue_share(struct render_queue *queue, unsigned long flight, const char *client)
+{
+	pthread_mutex_lock(&queue->mutex);
+	struct render_job *job = job_of(fair_order_first(queue->order, is_of_flight, &flight));
+	if (job && fair_order_share(queue->order, &job->entry, client, clock_now_ms())) {
+		snprintf(job->line, sizeof job->line, "%s", client); /* the client may leave before its job ends */
+		job->client = job->entry.client = job->line;
+	}
+	pthread_mutex_unlock(&queue->mutex);
+}
+
+/* What a prediction leaves of the job that runs. */
+static double left_ms(const struct render_queue *queue, double predicted_ms)
+{
+	return predicted_ms > 0 ? fmax(predicted_ms - (clock_now_ms() - queue->running_since_ms), 0) : 0;
+}
+
+bool render_queue_foresee(struct render_queue *queue, unsigned long flight, const char *client, double *ahead_ms, double *own_ms)
+{
+	pthread_mutex_lock(&queue->mutex);
+	const struct render_job *job = job_of(fair_order_first(queue->order, is_of_flight, &flight));
+	const bool runs = !job && queue->running_flight == flight;
+	if (job) {
+		*ahead_ms =
+			fair_order_ahead_of_ms(queue->order, &job->entry, client, clock_now_ms()) + left_ms(queue, queue->running_turn_ms);
+		*own_ms = remaining_ms(job);
+	} else {
+		*ahead_ms = 0;
+		*own_ms = runs ? left_ms(queue, queue->running_ms) : 0;
+	}
+	pthread_mutex_unlock(&queue->mutex);
+	return job || runs;
 }
 
 bool render_queue_has(struct render_queue *queue, render_job_wanted *wanted, void *context)
@@ -245,12 +288,6 @@ double render_queue_pixels(struct render_queue *queue)
 	double pixels = queue->pixels;
 	pthread_mutex_unlock(&queue->mutex);
 	return pixels;
-}
-
-/* What a prediction leaves of the job that runs. */
-static double left_ms(const struct render_queue *queue, double predicted_ms)
-{
-	return predicted_ms > 0 ? fmax(predicted_ms - (clock_now_ms() - queue->running_since_ms), 0) : 0;
 }
 
 double render_queue_backlog_ms(struct render_queue *queue)

@@ -7,6 +7,7 @@
 #define STRATUS_SERVER_RENDER_QUEUE_H
 
 #include "renderer/renderer.h"
+#include "server/client_address.h"
 #include "server/fair_order.h"
 
 enum render_outcome {
@@ -15,6 +16,7 @@ enum render_outcome {
 	RENDER_OUTCOME_ABANDONED /* nobody waits for it any more */,
 	RENDER_OUTCOME_NO_MEMORY, /* this scene is too large for the device as it is loaded; others may do */
 	RENDER_OUTCOME_FAILED,
+	RENDER_OUTCOME_STOPPED,    /* of a wait (call.h): a shutdown gave it up */
 	RENDER_OUTCOME_UNAVAILABLE /* there is no renderer any more, or another device than before */
 };
 
@@ -37,6 +39,8 @@ struct render_job {
 	_Atomic double deadline_ms;              /* on the clock of clock.h; moved by others who come to wait for it too */
 	double queued_ms;                        /* likewise, set by render_queue_push */
 	const char *client;                      /* key of whom it is for; must live as long. NULL: nobody's in particular */
+	unsigned long flight;                    /* number of the flight (flight.h) that it is for; 0: others cannot join */
+	char line[CLIENT_KEY_SIZE];              /* the queue's own: key of whoever joined and has it served sooner */
 	int cost_ranks[COST_PARTS];              /* the cost model's own */
 	double predicted_ms;                     /* of the render thread's time; 0: unknown */
 
@@ -102,6 +106,14 @@ void render_queue_settle(struct render_queue *queue, struct render_job *job, dou
 
 /* Takes a wanted job out that is not to be served any more; nobody pays, nothing follows. NULL: there is none. */
 struct render_job *render_queue_remove(struct render_queue *queue, render_job_wanted *wanted, void *context);
+
+/* Another client joins a flight: its job, if it waits, goes to that client's line when it is served sooner there, and is that client's to
+ * pay from then on. */
+void render_queue_share(struct render_queue *queue, unsigned long flight, const char *client);
+
+/* What is to be done before the job of a flight when this client joins, and for the job itself, as predicted. false: it neither waits nor
+ * runs. */
+bool render_queue_foresee(struct render_queue *queue, unsigned long flight, const char *client, double *ahead_ms, double *own_ms);
 
 /* Is there a job that is wanted? Likewise. */
 bool render_queue_has(struct render_queue *queue, render_job_wanted *wanted, void *context);

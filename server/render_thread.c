@@ -1,5 +1,6 @@
 #include "server/render_thread.h"
 
+#include "renderer/golden.h"
 #include "renderer/log.h"
 #include "server/clock.h"
 #include "server/kernel_file.h"
@@ -13,6 +14,9 @@
 
 /* So many failures on end are taken for a dead context rather than for bad luck. */
 enum { FAILURES_MAX = 3 };
+
+/* What has no memory for a picture this small, that of the golden render, has none for any. */
+enum { SMALL_PIXELS = GOLDEN_COLUMNS * GOLDEN_ROWS * GOLDEN_BLOCK * GOLDEN_BLOCK };
 
 /* A scene that has the driver reset itself so often is not tried again. */
 enum { INTERRUPTIONS_MAX = 2 };
@@ -30,9 +34,10 @@ struct render_thread {
 	struct renderer_care *care;
 	_Atomic int state; /* enum render_thread_state; kernel, droplets and care are set before it says READY */
 	struct heartbeat heartbeat;
-	int failures;               /* on end */
+	int failures;               /* on end, that speak against the context */
+	int suspicions;             /* likewise, that may be the scenes' own fault */
 	struct render_job *pending; /* a reference in the queue that is on its way, or NULL */
-	double idle_since_ms;
+	bool is_idle;
 	struct transfers transfers;
 };
 
@@ -69,7 +74,9 @@ static bool may_pass(struct render_job *job, void *context)
 static bool is_paused(void *context)
 {
 	const struct running_job *running = context;
-	return clock_now_ms() >= running->pause_ms && render_queue_has(running->thread->queue, may_pass, NULL);
+	const struct render_thread *thread = running->thread;
+	return clock_now_ms() >= running->pause_ms &&
+	       (render_queue_has(thread->queue, may_pass, NULL) || renderer_care_is_unproven(thread->care));
 }
 
 static enum render_result ask_renderer(struct render_thread *thread, struct render_job *job)
@@ -82,17 +89,30 @@ static enum render_result ask_renderer(struct render_thread *thread, struct rend
 			      &job->frame);
 }
 
+static bool is_small(const struct render_job *job)
+{
+	const struct scene_output *output = &job->scene->output;
+	return !job->directions && (double)output->width * output->height * __builtin_popcount(output->layers) <= SMALL_PIXELS;
+}
+
+/* A scene that does not fit, or takes a program that there is not, says nothing about the next one; several of them on end may: then the
+ * golden render decides. */
+static void count_failure(struct render_thread *thread, const struct render_job *job, enum render_result result)
+{
+	const bool is_own_fault = result == RENDER_NO_PROGRAM || (result == RENDER_OUT_OF_MEMORY && !is_small(job));
+	*(is_own_fault ? &thread->suspicions : &thread->failures) += 1;
+}
+
 static enum render_outcome outcome_of(struct render_thread *thread, struct render_job *job, enum render_result result)
 {
 	if (result == RENDER_CANCELLED)
 		return job->outcome;
-	/* A scene that does not fit says nothing about the next one: only a failing device turns the daemon's health. */
-	if (result == RENDER_OUT_OF_MEMORY)
-		return RENDER_OUTCOME_NO_MEMORY;
-	if (result == RENDER_NO_PROGRAM)
-		return RENDER_OUTCOME_FAILED;
-	thread->failures = result == RENDER_OK ? 0 : thread->failures + 1;
-	return result == RENDER_OK ? RENDER_OUTCOME_OK : RENDER_OUTCOME_FAILED;
+	if (result == RENDER_OK) {
+		thread->failures = thread->suspicions = 0;
+		return RENDER_OUTCOME_OK;
+	}
+	count_failure(thread, job, result);
+	return result == RENDER_OUT_OF_MEMORY ? RENDER_OUTCOME_NO_MEMORY : RENDER_OUTCOME_FAILED;
 }
 
 /* A job that a lost context interrupted goes back to the queue. */
@@ -176,7 +196,7 @@ static void recover(struct render_thread *thread, enum care_reason reason)
 	thread->state = RENDER_THREAD_RECOVERING;
 	await_transfers(thread);
 	forget_pending(thread);
-	thread->failures = 0;
+	thread->failures = thread->suspicions = 0;
 	thread->state = renderer_care_rebuild(thread->care, reason) ? RENDER_THREAD_READY : RENDER_THREAD_FAILED;
 	if (thread->state == RENDER_THREAD_FAILED)
 		log_error("renderer: it cannot be brought up again");
@@ -192,8 +212,10 @@ static bool has_work(void *context)
 
 static void look_after_renderer(struct render_thread *thread)
 {
-	const double idle_ms = thread->idle_since_ms > 0 ? clock_now_ms() - thread->idle_since_ms : 0;
-	enum care_reason reason = renderer_care_look(thread->care, idle_ms, has_work, thread);
+	const bool is_suspect = thread->suspicions >= FAILURES_MAX;
+	enum care_reason reason = renderer_care_look(thread->care, thread->is_idle, is_suspect, has_work, thread);
+	if (is_suspect)
+		thread->suspicions = 0;
 	if (reason == CARE_NONE && thread->failures >= FAILURES_MAX)
 		reason = CARE_FAILURES;
 	if (reason != CARE_NONE)
@@ -211,11 +233,10 @@ static struct render_job *await_job(struct render_thread *thread)
 		job = render_queue_pop_within(thread->queue, CARE_MS, &closed);
 		if (job || closed)
 			break;
-		if (!(thread->idle_since_ms > 0))
-			thread->idle_since_ms = clock_now_ms();
+		thread->is_idle = true;
 		look_after_renderer(thread);
 	}
-	thread->idle_since_ms = 0;
+	thread->is_idle = false;
 	return job;
 }
 
@@ -254,7 +275,6 @@ static void run_jobs(struct render_thread *thread)
 	for (struct render_job *job; (job = next_job(thread));) {
 		const double start = clock_now_ms();
 		const bool was_pending = job->pending;
-		thread->idle_since_ms = 0;
 		heartbeat_begin(&thread->heartbeat, thread->config->hang_ms);
 		job->phase = RENDER_PHASE_RENDERING;
 		const enum render_result result = run_job(thread, job);

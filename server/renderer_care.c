@@ -23,6 +23,9 @@ enum { TRIES = sizeof pauses_ms / sizeof *pauses_ms };
 #define MEMORY_LOOK_MS 1000.0
 #define MEMORY_WAIT_MS 30000.0
 
+/* With work throughout, the golden render comes between two pictures after so many times --golden-s. */
+#define UNPROVEN_TIMES 4.0
+
 const char *const care_reason_names[CARE_REASON_COUNT] = {
 	[CARE_NONE] = "none",     [CARE_GUILTY] = "guilty",     [CARE_INNOCENT] = "innocent", [CARE_UNKNOWN] = "unknown",
 	[CARE_GOLDEN] = "golden", [CARE_FAILURES] = "failures", [CARE_MEMORY] = "memory"};
@@ -58,10 +61,23 @@ struct renderer_care {
 
 /* --- proof ------------------------------------------------------------------------------------------------------------------------ */
 
-static enum golden_result prove(struct renderer_care *care, renderer_cancelled *cancelled, void *context)
+struct proof {
+	renderer_cancelled *cancelled;
+	void *context;
+	bool is_urgent, with_sky;
+};
+
+/* Whoever is asked shows signs of life, so each is. */
+static bool is_cancelled(void *context)
+{
+	const struct proof *proof = context;
+	return proof->cancelled && proof->cancelled(proof->context) && !proof->is_urgent;
+}
+
+static enum golden_result prove(struct renderer_care *care, struct proof proof)
 {
 	struct golden_picture picture;
-	enum golden_result result = golden_render(care->renderer, cancelled, context, &picture);
+	enum golden_result result = golden_render(care->renderer, proof.with_sky, is_cancelled, &proof, &picture);
 	if (result == GOLDEN_CANCELLED)
 		return result;
 	if (result == GOLDEN_PASSED && !golden_compare(&picture, &care->expected))
@@ -75,7 +91,7 @@ static enum golden_result prove(struct renderer_care *care, renderer_cancelled *
 static bool learn_expected(struct renderer_care *care)
 {
 	care->expected = golden_expected;
-	return !care->config->shader_dir || golden_render(care->renderer, NULL, NULL, &care->expected) == GOLDEN_PASSED;
+	return !care->config->shader_dir || golden_render(care->renderer, false, NULL, NULL, &care->expected) == GOLDEN_PASSED;
 }
 
 /* --- memory ----------------------------------------------------------------------------------------------------------------------- */
@@ -211,7 +227,7 @@ static bool bring_up(struct renderer_care *care)
 	set_renderer(care, renderer_create(&params));
 	if (!care->renderer)
 		return false;
-	if ((!first || learn_expected(care)) && prove(care, NULL, NULL) == GOLDEN_PASSED && publish(care)) {
+	if ((!first || learn_expected(care)) && prove(care, (struct proof){0}) == GOLDEN_PASSED && publish(care)) {
 		note_memory(care);
 		return true;
 	}
@@ -279,18 +295,29 @@ bool renderer_care_rebuild(struct renderer_care *care, enum care_reason reason)
 
 _Static_assert((int)CARE_GUILTY == (int)RENDERER_LOST_GUILTY && (int)CARE_UNKNOWN == (int)RENDERER_LOST_UNKNOWN, "one list");
 
-enum care_reason renderer_care_look(struct renderer_care *care, double idle_ms, renderer_cancelled *cancelled, void *context)
+static bool is_older(const struct renderer_care *care, double times)
 {
 	const double golden_ms = 1e3 * care->config->golden_s;
+	return golden_ms > 0 && clock_now_ms() >= care->golden_ms + times * golden_ms;
+}
+
+bool renderer_care_is_unproven(const struct renderer_care *care)
+{
+	return is_older(care, UNPROVEN_TIMES);
+}
+
+enum care_reason renderer_care_look(struct renderer_care *care, bool is_idle, bool is_suspect, renderer_cancelled *cancelled, void *context)
+{
 	enum renderer_loss loss = renderer_look();
 	if (loss != RENDERER_NOT_LOST)
 		return (enum care_reason)loss;
-	if (is_to_be_recycled(care, idle_ms > 0))
+	if (is_to_be_recycled(care, is_idle))
 		return CARE_MEMORY;
-	if (golden_ms <= 0 || idle_ms < golden_ms || clock_now_ms() < care->golden_ms + golden_ms)
+	const bool is_urgent = is_suspect || renderer_care_is_unproven(care);
+	if (!is_urgent && !(is_idle && is_older(care, 1)))
 		return CARE_NONE;
 	heartbeat_begin(care->heartbeat, care->config->hang_ms);
-	const enum golden_result result = prove(care, cancelled, context);
+	const enum golden_result result = prove(care, (struct proof){cancelled, context, is_urgent, is_suspect});
 	heartbeat_end(care->heartbeat);
 	loss = result == GOLDEN_FAILED ? renderer_look() : RENDERER_NOT_LOST;
 	return loss ? (enum care_reason)loss : result == GOLDEN_FAILED ? CARE_GOLDEN : CARE_NONE;

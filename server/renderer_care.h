@@ -43,9 +43,13 @@ void renderer_care_destroy(struct renderer_care *care);
 /* Never NULL but after a failed renderer_care_rebuild. */
 struct renderer *renderer_care_renderer(const struct renderer_care *care);
 
-/* Looks whether the renderer is to be made anew. idle_ms: since when there was nothing to do, 0: there is; cancelled: asked whether that is
- * over, then the golden render stops. */
-enum care_reason renderer_care_look(struct renderer_care *care, double idle_ms, renderer_cancelled *cancelled, void *context);
+/* Looks whether the renderer is to be made anew. is_idle: there is nothing to do, so that the golden render is made when the last one is
+ * --golden-s old; cancelled: asked whether that is over, then it stops. is_suspect: it is made at once, and to its end, with a new sky. */
+enum care_reason renderer_care_look(struct renderer_care *care, bool is_idle, bool is_suspect, renderer_cancelled *cancelled,
+				    void *context);
+
+/* Is the last golden render so old that the next one waits for nothing? */
+bool renderer_care_is_unproven(const struct renderer_care *care);
 
 /* Makes it anew, a bounded number of times with pauses between, until it proves itself. Nothing may be on its way. false: it does not, and
  * there is none. */

@@ -338,6 +338,8 @@ static void encode(struct work *base)
 	if (taken)
 		image = encode_frame(work);
 	wanted = image || !is_unwanted(work);
+	if (wanted)
+		encoder_care_note(&work->service->encoders, image != NULL);
 	work->is_kept = image && work->may_be_kept && image_cache_keep(work->service->finished, image);
 	work->job.encoded_ms = clock_now_ms() - start;
 	if (image)
@@ -421,6 +423,7 @@ static void start(struct render_work *work)
 	admission_price(request, &work->job);
 	snprintf(work->client, sizeof work->client, "%s", request->client); /* the request may end before its work */
 	work->job.client = work->client;
+	work->job.flight = work->flight.number;
 	work->decoding_since_ms = clock_now_ms();
 	if (!(scene_assets_take(service->maps, &work->input.scene, &work->assets) ? preparation_push(service->preparation, &work->job)
 										  : worker_pool_try(service->decoders, &work->decode)))
@@ -433,6 +436,9 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 	struct service *service = request->service;
 	const bool may_be_found = work->may_be_found;
 	enum MHD_Result refused;
+	const unsigned long others = may_be_found ? flights_find(service->flights, work->tag) : 0;
+	if (others && !admission_join(request, others, &work->input.scene, deadline_ms))
+		return response_send_problem(request);
 	if (!access_admit_pixels(request, pixels_of(&work->input.scene.output), &refused))
 		return refused;
 	work->service = service;
@@ -457,6 +463,7 @@ static enum MHD_Result enqueue(struct request *request, double deadline_ms)
 		break;
 	case FLIGHT_JOINED:
 		metrics_count_image(service->metrics, IMAGE_SHARED);
+		render_queue_share(service->queue, work->seat.flight, request->client);
 		break;
 	case FLIGHT_ARRIVED:
 		metrics_count_image(service->metrics, IMAGE_FROM_CACHE);

@@ -162,7 +162,7 @@ static void count(const struct slab_work *work)
 {
 	static const enum metrics_end ends[] = {[CALL_EXPIRED] = ENDED_EXPIRED,
 						[CALL_ABANDONED] = ENDED_ABANDONED,
-						[CALL_STOPPED] = ENDED_ABANDONED,
+						[CALL_STOPPED] = ENDED_STOPPED,
 						[CALL_FAILED] = ENDED_FAILED};
 	struct metrics *metrics = work->request->service->metrics;
 	if (!is_tracing(work))

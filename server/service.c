@@ -21,6 +21,11 @@
 #define ABANDON_MS_MAX   3000.0
 #define ABANDON_MS_STILL 300.0
 
+/* What a shutdown gives up: that renders end, which they do between two passes, and that their clients read why. With --drain-s this and
+ * some seconds for all else are TimeoutStopSec= in ops/stratusd.service. */
+#define GIVE_UP_MS_MAX 10000.0
+#define REFUSE_MS_MAX  5000.0
+
 /* Tracing photons takes what rendering and encoding leave. */
 enum { COMPUTER_COUNT = 2, DECODER_NICE = 2, COMPUTER_NICE = 5, TRACER_NICE = 10 };
 
@@ -122,6 +127,7 @@ static void drop_over(void *context)
 	preparation_drop_over(service->preparation);
 	worker_pool_sweep(service->decoders);
 	drop_wrong(service);
+	encoder_care_look(&service->encoders, service->images);
 }
 
 struct service *service_create(const struct config *config)
@@ -185,12 +191,21 @@ enum service_state service_wait(struct service *service, int milliseconds)
 	return service_state(service);
 }
 
-/* Answers to accepted requests go out; a client that does not read its answer is not waited for longer than a request may take. */
+static void await_answers(const struct service *service, double milliseconds)
+{
+	const double limit_ms = clock_now_ms() + milliseconds;
+	while (service->in_flight > 0 && clock_now_ms() < limit_ms)
+		usleep(5000);
+}
+
+/* Answers to accepted requests go out: each is done, or late, by its own deadline. What is left when the time for that is over, clients
+ * that do not read their answers among it, is given up. */
 static void drain(struct service *service)
 {
-	double limit = clock_now_ms() + service->config->timeout_ms + 5000;
-	while (service->in_flight > 0 && clock_now_ms() < limit)
-		usleep(5000);
+	await_answers(service, 1e3 * service->config->drain_s);
+	if (service->suspended > 0)
+		log_warning("shutdown: %zu requests are not done after %d s (--drain-s), and are answered so", (size_t)service->suspended,
+			    service->config->drain_s);
 	service->giving_up = true;
 	if (service->decoder)
 		decoder_give_up(service->decoder);
@@ -206,7 +221,7 @@ static bool is_working(const struct service *service)
  * then nothing is left that could be saved. */
 static void await_suspended(struct service *service)
 {
-	double limit = clock_now_ms() + 10000;
+	double limit = clock_now_ms() + GIVE_UP_MS_MAX;
 	while (is_working(service) && clock_now_ms() < limit)
 		usleep(1000);
 	if (is_working(service)) {
@@ -223,6 +238,7 @@ void service_destroy(struct service *service)
 	http_quiesce(service);
 	drain(service);
 	await_suspended(service);
+	await_answers(service, REFUSE_MS_MAX);
 	connections_stop(service->connections);
 	http_stop(service);
 	preparation_destroy(service->preparation);
@@ -305,7 +321,8 @@ enum service_state service_state(const struct service *service)
 		return SERVICE_STOPPING;
 	if (!service->ready)
 		return SERVICE_STARTING;
-	return render_thread_state(service->render_thread) == RENDER_THREAD_RECOVERING ? SERVICE_RECOVERING : SERVICE_READY;
+	const bool recovers = render_thread_state(service->render_thread) == RENDER_THREAD_RECOVERING;
+	return recovers || encoder_care_is_broken(&service->encoders) ? SERVICE_RECOVERING : SERVICE_READY;
 }
 
 size_t service_queue_depth(const struct service *service)

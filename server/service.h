@@ -9,6 +9,7 @@
 #include "server/connections.h"
 #include "server/cost_model.h"
 #include "server/decoder.h"
+#include "server/encoder_care.h"
 #include "server/flight.h"
 #include "server/intake.h"
 #include "server/metrics.h"
@@ -22,7 +23,7 @@
 enum service_state {
 	SERVICE_STARTING,
 	SERVICE_READY,
-	SERVICE_RECOVERING, /* takes work, which waits for the renderer to be made anew */
+	SERVICE_RECOVERING, /* takes work, which waits for the renderer to be made anew, or fails since no picture can be written */
 	SERVICE_STOPPING,   /* finishing what was accepted */
 	SERVICE_FAILED      /* a restart is needed */
 };
@@ -59,16 +60,17 @@ struct service {
 	unsigned port;
 	int listening_socket; /* taken from libmicrohttpd while stopping; else negative */
 
-	unsigned long wrong_seen;    /* golden renders that failed; of the connections' thread */
-	_Atomic size_t in_flight;    /* requests read to their end and not answered to theirs */
-	_Atomic size_t memory_bytes; /* promised to pictures in work, and of their answers (admission.h) */
-	_Atomic size_t suspended;    /* those of them that others work for */
-	_Atomic double tracing_ms;   /* what the last tracing took */
-	_Atomic double computing_ms; /* what the last call did that computers worked for */
-	_Atomic bool ready;          /* has been ready to render */
-	_Atomic bool stopping;       /* takes no new work */
-	_Atomic bool abandoned;      /* since there is no renderer any more */
-	_Atomic bool giving_up;      /* drops the accepted work too */
+	struct encoder_care encoders; /* whether they can write pictures */
+	unsigned long wrong_seen;     /* golden renders that failed; of the connections' thread */
+	_Atomic size_t in_flight;     /* requests read to their end and not answered to theirs */
+	_Atomic size_t memory_bytes;  /* promised to pictures in work, and of their answers (admission.h) */
+	_Atomic size_t suspended;     /* those of them that others work for */
+	_Atomic double tracing_ms;    /* what the last tracing took */
+	_Atomic double computing_ms;  /* what the last call did that computers worked for */
+	_Atomic bool ready;           /* has been ready to render */
+	_Atomic bool stopping;        /* takes no new work */
+	_Atomic bool abandoned;       /* since there is no renderer any more */
+	_Atomic bool giving_up;       /* drops the accepted work too, since the time for it is over */
 };
 
 /* Starts serving; rendering comes up behind. NULL (and a log line) on failure, such as an address in use. Main thread. */
@@ -77,7 +79,8 @@ struct service *service_create(const struct config *config);
 /* Waits until the service can render, at most so long. SERVICE_STARTING: not yet. Main thread. */
 enum service_state service_wait(struct service *service, int milliseconds);
 
-/* Takes no new work, finishes what was accepted (within a bound), stops all threads, frees everything. Takes NULL. Main thread. */
+/* Takes no new work, finishes what was accepted, within --drain-s, and refuses the rest of it; stops all threads, frees everything. Takes
+ * NULL. Main thread. */
 void service_destroy(struct service *service);
 
 /* The renderer hangs or cannot be had any more: answers what can be answered without it, for at most some seconds. Nothing is freed, and

@@ -203,7 +203,7 @@ static bool render(struct renderer *renderer, const struct scene *scene, const c
 static bool write_golden(struct renderer *renderer, const char *path)
 {
 	struct golden_picture picture;
-	if (golden_render(renderer, NULL, NULL, &picture) != GOLDEN_PASSED)
+	if (golden_render(renderer, false, NULL, NULL, &picture) != GOLDEN_PASSED)
 		return false;
 	golden_compare(&picture, &golden_expected);
 	FILE *file = fopen(path, "w");

@@ -8,7 +8,9 @@
  *   poison         WIDTH, as long as the link exists: the driver reports a reset after each texture of that width
  *   gl-error       the next question for errors is answered with one
  *   gl-memory      OpenGL has no memory for the next texture
+ *   gl-full        WIDTH, as long as the link exists: OpenGL has no memory for textures wider than that
  *   host-memory    BYTES: the next allocation of at least so many fails
+ *   encode         as long as the link exists: no picture can be written
  *   shader         the driver takes the next shader for one that does not compile
  *   hang           S: the next pass holds the thread up for so many seconds
  *   hold           as long as the link exists: the next pass waits, and a link `held` says that it does
@@ -19,6 +21,7 @@
  * The daemon's own code knows nothing of this: what it calls is replaced, OpenGL behind libepoxy's pointers, EGL likewise, and malloc() and
  * the reading of flags by the linker (--wrap).
  */
+#include "renderer/image/image.h"
 #include "server/config.h"
 
 #include <epoxy/egl.h>
@@ -81,7 +84,7 @@ static void EPOXY_CALLSPEC faulty_glTextureStorage2D(GLuint texture, GLsizei lev
 {
 	double number;
 	RESTORE(glTextureStorage2D);
-	if (find("gl-memory", &number, true))
+	if (find("gl-memory", &number, true) || (find("gl-full", &number, false) && width > (GLsizei)number))
 		memory_error = true;
 	else
 		real_glTextureStorage2D(texture, levels, format, width, height);
@@ -185,6 +188,8 @@ static EGLBoolean EPOXY_CALLSPEC faulty_eglDestroyContext(EGLDisplay display, EG
 
 enum config_result __real_config_parse(int argc, char **argv, struct config *config);
 enum config_result __wrap_config_parse(int argc, char **argv, struct config *config);
+const struct image_api *__real_image_module_load(const char *path);
+const struct image_api *__wrap_image_module_load(const char *path);
 void *__real_malloc(size_t size);
 void *__wrap_malloc(size_t size);
 
@@ -197,6 +202,29 @@ void *__wrap_malloc(size_t size)
 	if (size >= SMALL_BYTES && find("host-memory", &number, false) && (double)size >= number && find("host-memory", &number, true))
 		return NULL;
 	return __real_malloc(size);
+}
+
+static const struct image_api *real_images;
+
+static bool faulty_encode(const struct frame *frame, const struct scene *scene, const struct image_metadata *metadata,
+			  const struct image_watch *watch, struct image_buffer *buffer, char *error, size_t error_size)
+{
+	double number;
+	if (!find("encode", &number, false))
+		return real_images->encode(frame, scene, metadata, watch, buffer, error, error_size);
+	snprintf(error, error_size, "told to fail");
+	return false;
+}
+
+const struct image_api *__wrap_image_module_load(const char *path)
+{
+	static struct image_api images;
+	real_images = __real_image_module_load(path);
+	if (!real_images)
+		return NULL;
+	images = *real_images;
+	images.encode = faulty_encode;
+	return &images;
 }
 
 enum config_result __wrap_config_parse(int argc, char **argv, struct config *config)

@@ -95,6 +95,28 @@ def test_of_one_client_small_ones_go_first(served):
     assert order_of(served, "one").index("small") <= 4
 
 
+def test_what_another_asked_for_last_comes_in_ones_own_turn(served):
+    """Not behind the batch of the other, which gets it then as well."""
+    shared = 'stratus_image_requests_total{source="shared"}'
+    with concurrent.futures.ThreadPoolExecutor(12) as pool:
+        with served.busy():
+            batch = [picture(next(seeds), 320, 240) for _ in range(10)]
+            running = []
+            for i, scene in enumerate(batch):  # one after the other, so that the last is the last
+                running.append(pool.submit(render_from, served, "127.0.0.1", scene, **{"X-Request-Id": f"joined-{i}"}))
+                assert wait_for(lambda: served.metric("stratus_queue_depth") == i + 1)
+            before = served.metric(shared)
+            joined = pool.submit(render_from, served, "127.0.0.2", batch[-1], **{"X-Request-Id": "joined-too"})
+            assert wait_for(lambda: served.metric(shared) == before + 1)
+            assert served.metric("stratus_queue_depth") == 10
+        assert joined.result()[0] == 200
+        assert {r.result()[0] for r in running} == {200}
+        assert joined.result()[2] == running[-1].result()[2]
+    assert wait_for(lambda: len(order_of(served, "joined")) == 11)
+    order = order_of(served, "joined")
+    assert order.index("too") <= 4 and order.index("9") <= 4, f"who joined waited for the batch: {order}"
+
+
 # --- deadlines ---------------------------------------------------------------------------------------------------------------------
 
 
@@ -126,6 +148,34 @@ def test_what_cannot_be_done_in_time_is_refused_at_once(served):
             served.fail("hold")
         leave(batch)
     served.settle()
+
+
+def test_who_joins_too_late_a_picture_is_refused_at_once(served):
+    """As who asks for another one is. With more time it is shared."""
+    late, shared = 'stratus_queue_rejected_total{reason="predicted_late"}', 'stratus_image_requests_total{source="shared"}'
+
+    def reference(samples):
+        return {"model": {"name": "reference", "samples": samples, "seed": next(seeds)}, "output": {"width": 160, "height": 120}}
+
+    def is_refused():
+        for samples in (4, 8):
+            assert served.render(reference(samples)).status == 200
+        refused, joined, long = served.metric(late), served.metric(shared), reference(512)  # takes half a minute and more
+        with send(served, long):
+            assert wait_for(lambda: served.metric("stratus_queue_taken") == 1 and served.metric("stratus_queue_depth") == 0)
+            deadline_ms = int(min(2000, 250 * served.metric("stratus_queue_backlog_seconds")))
+            answer = served.render(long, X_Timeout_Ms=str(deadline_ms))
+            with send(served, long):
+                assert wait_for(lambda: served.metric(shared) >= joined + 1)
+        assert wait_for(lambda: served.metric("stratus_queue_taken") == 0)
+        if answer.status == 504:  # a machine so busy that what was measured has grown old
+            return False
+        assert (answer.status, answer.json["type"]) == (503, "urn:stratus:problem:predicted-late")
+        assert answer.json["predicted_ms"] > deadline_ms and int(answer.headers["Retry-After"]) >= 1
+        assert served.metric(late) == refused + 1
+        return True
+
+    assert in_some_try(is_refused)
 
 
 def test_idle_nothing_is_refused_for_its_predicted_time(served):

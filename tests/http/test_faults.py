@@ -15,7 +15,7 @@ import time
 
 import pytest
 
-from conftest import BUILD, KERNEL, ROOT, FaultyDaemon, in_some_try, wait_for
+from conftest import BUILD, KERNEL, ROOT, FaultyDaemon, in_some_try, send, wait_for
 
 SMALL = {"width": 64, "height": 48}
 
@@ -196,6 +196,72 @@ def test_no_memory_on_the_host(faulty):
     assert faulty.render(scene).status == 200
 
 
+def golden(daemon, result):
+    return daemon.metric(f'stratus_golden_renders_total{{result="{result}"}}')
+
+
+WIDE = {"width": 3200, "height": 16}
+
+
+def test_pictures_that_do_not_fit(faulty):
+    """After each third on end the golden render decides; the daemon stays ready, and others go on."""
+    passed, resets = golden(faulty, "passed"), {reason: faulty.resets(reason) for reason in ("golden", "failures")}
+    faulty.fail("gl-full", 3000)
+    for turn in range(1, 3):
+        for i in range(3):
+            answer = faulty.render({"camera": {"azimuth_deg": 10 * turn + i}, "output": WIDE})
+            check_no_memory(faulty, answer)
+        assert wait_for(lambda: golden(faulty, "passed") == passed + turn)
+    assert faulty.render({"camera": {"azimuth_deg": 33}, "output": SMALL}).status == 200
+    faulty.heal("gl-full")
+    assert faulty.render({"camera": {"azimuth_deg": 34}, "output": WIDE}).status == 200
+    assert {reason: faulty.resets(reason) for reason in resets} == resets
+
+
+@pytest.mark.parametrize("width", [0, 100])
+def test_no_memory_for_anything_new(faulty, width):
+    """Not ready, until the golden render comes out again: that which is remembered of its sky helps it as little as others. It is 96 pixels wide."""
+    resets, failed = faulty.resets("golden"), golden(faulty, "failed")
+    assert faulty.render({"output": WIDE}).status == 200
+    faulty.fail("gl-full", width)
+    for i in range(3):
+        assert faulty.render({"sun": {"elevation_deg": 21 + i + width / 1000}, "output": WIDE}).status == 503
+    assert wait_for(lambda: not faulty.is_ready())
+    assert golden(faulty, "failed") > failed
+    faulty.heal("gl-full")
+    assert wait_for(faulty.is_ready)
+    assert faulty.resets("golden") == resets + 1
+    assert faulty.render({"sun": {"elevation_deg": 21}, "output": WIDE}).status == 200
+
+
+def test_no_memory_for_small_pictures(faulty):
+    """What has none for these has none for any: the renderer is made anew, as after other failures on end."""
+    resets = faulty.resets("failures")
+    faulty.render({"output": SMALL})
+    for i in range(3):
+        assert faulty.resets("failures") == resets
+        faulty.fail("gl-memory")
+        assert faulty.render({"sun": {"elevation_deg": 61 + i}, "output": SMALL}).json["type"] == "urn:stratus:problem:no-memory"
+    assert wait_for(lambda: faulty.resets("failures") == resets + 1)
+    assert wait_for(faulty.is_ready)
+    assert faulty.render({"sun": {"elevation_deg": 61}, "output": SMALL}).status == 200
+
+
+def test_pictures_that_cannot_be_written(faulty):
+    """Not ready once three could not on end, by itself ready again when one can."""
+    scene = {"clouds": {"seed": 6200}, "output": SMALL}
+    faulty.fail("encode")
+    assert [faulty.render(scene).status for _ in range(2)] == [500] * 2
+    assert faulty.is_ready()
+    assert faulty.render(scene).status == 500
+    assert wait_for(lambda: not faulty.is_ready())
+    assert faulty.get("/readyz").json["status"] == "recovering"
+    assert faulty.get("/healthz").status == 200 and faulty.render(scene).status == 500
+    faulty.heal("encode")
+    assert wait_for(faulty.is_ready)
+    assert faulty.render(scene).status == 200
+
+
 # --- a shader that is compiled when it is needed ---------------------------------------------------------------------------------------
 
 
@@ -235,6 +301,21 @@ def test_a_device_that_draws_nothing(start_faulty):
     assert daemon.resets("golden") == 1
     assert "golden render: " in daemon.text
     assert daemon.render(scene).body == daemon.render(scene, Cache_Control="no-cache").body  # nothing of that time is kept
+
+
+def test_a_device_that_draws_nothing_while_it_is_busy(start_faulty):
+    """It is noticed though there is work throughout: one picture of many minutes."""
+    daemon = start_faulty("--golden-s", "1")
+    with send(daemon, {"model": {"name": "reference", "samples": 4096}, "output": {"width": 320, "height": 240}}):
+        assert wait_for(lambda: daemon.metric("stratus_queue_taken") == 1)
+        passed = golden(daemon, "passed")
+        assert wait_for(lambda: golden(daemon, "passed") >= passed + 2)
+        assert daemon.metric("stratus_queue_taken") == 1  # that one still
+        daemon.fail("black")
+        assert wait_for(lambda: not daemon.is_ready())
+        daemon.heal("black")
+        assert wait_for(daemon.is_ready)
+        assert daemon.resets("golden") == 1
 
 
 def start_in_vain(program, *flags, folder):

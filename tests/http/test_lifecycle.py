@@ -1,6 +1,7 @@
 """Overload, shutdown, settings: daemons of their own."""
 import concurrent.futures
 import http.client
+import json
 import os
 import signal
 import socket
@@ -46,6 +47,47 @@ def test_shutdown_finishes_accepted_work(start_faulty):
     assert daemon.process.wait(timeout=180) == 0
     with pytest.raises(ConnectionError):
         daemon.get("/healthz")
+
+
+def test_shutdown_waits_for_the_deadlines_that_were_accepted(start_faulty):
+    """Not for the usual one, which is over long before the renderer goes on."""
+    daemon = start_faulty("--timeout-ms", "100")
+    with daemon.busy() as client:
+        daemon.process.send_signal(signal.SIGTERM)
+        assert wait_for(lambda: "SIGTERM: " in daemon.text)
+        time.sleep(6)
+    assert client.recv(12) == b"HTTP/1.1 200"
+    assert daemon.process.wait(timeout=180) == 0
+
+
+def answer_on(client):
+    """What comes until the daemon closes the connection."""
+    return b"".join(iter(lambda: client.recv(1 << 16), b""))
+
+
+def test_shutdown_refuses_what_takes_too_long(start_daemon):
+    """Each who waits hears why, whatever it waits for, and is logged so."""
+    daemon = start_daemon("--drain-s", "1")
+    long = {"model": {"name": "reference", "samples": 4096}, "output": {"width": 320, "height": 240}}  # takes minutes
+    clients = [send(daemon, long, X_Request_Id="cut-own"), send(daemon, long, X_Request_Id="cut-shared")]
+    clients.append(send(daemon, {"model": {**long["model"], "seed": 2}, "output": long["output"]}, X_Request_Id="cut-queued"))
+    both = json.dumps({"scene": long, "variants": [{}, {"model": {"seed": 3}}]}).encode()
+    clients.append(socket.create_connection(("127.0.0.1", daemon.port), timeout=180))
+    clients[3].sendall(
+        b"POST /v1/compare HTTP/1.1\r\nHost: x\r\nX-Timeout-Ms: 3600000\r\nX-Request-Id: cut-compared\r\n"
+        b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n%s" % (len(both), both)
+    )
+    assert wait_for(lambda: daemon.metric("stratus_requests_in_flight") == 5)  # the scrape is one
+    daemon.process.send_signal(signal.SIGTERM)
+    for client in clients:
+        head, body = answer_on(client).split(b"\r\n\r\n", 1)
+        assert head.startswith(b"HTTP/1.1 503 ") and b"\r\nRetry-After: " in head
+        assert b"application/problem+json" in head and json.loads(body)["type"] == "urn:stratus:problem:shutting-down"
+        client.close()
+    assert daemon.process.wait(timeout=180) == 0
+    ends = [line for line in daemon.lines if " request id=cut-" in line]
+    assert len(ends) == 4 and all(" status=503 " in line for line in ends), ends
+    assert any("4 requests are not done after 1 s (--drain-s)" in line for line in daemon.lines)
 
 
 def test_shutdown_when_idle_is_quick(start_daemon):
@@ -114,6 +156,7 @@ def run(*flags, **environment):
         ["--recycle-mb=-1"],
         ["--golden-s=often"],
         ["--hang-ms", "0"],
+        ["--drain-s=-1"],
         ["--images-mb", "-1"],
         ["--images-mb", "1.5"],
         ["--images-mb=2000000"],
@@ -145,7 +188,7 @@ def test_settings_are_printed():
 
 def test_help_and_version():
     text = run("--help").stdout
-    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms cache-mb recycle-mb golden-s hang-ms images-mb droplets-mb droplets-disk-mb asset-max-mb asset-count assets-disk-mb assets-mb log-level log-format".split():
+    for flag in "listen state-dir kernel device require-gpu pass shader-dir image-module queue-length workers timeout-ms drain-s cache-mb recycle-mb golden-s hang-ms images-mb droplets-mb droplets-disk-mb asset-max-mb asset-count assets-disk-mb assets-mb log-level log-format".split():
         assert "--" + flag in text and "STRATUS_" + flag.upper().replace("-", "_") in text
     assert run("--version").stdout.startswith("stratus ")
 

@@ -239,6 +239,55 @@ static void work_ahead(void **state)
 	end(world);
 }
 
+/* Who asks for what another has last in a batch has it served in its own turn, and pays for it. */
+static void shared_work_goes_where_it_is_sooner(void **state)
+{
+	(void)state;
+	struct world *world = begin();
+	struct job *batch[10], *running;
+	for (int i = 0; i < 10; i++)
+		batch[i] = add(world, 0, 100, 100);
+	running = take(world);
+	const double before_ms = fair_order_ahead_of_ms(world->order, &batch[9]->entry, "client 0", world->now_ms);
+	assert_float_equal(before_ms, 800, 1e-9);
+	assert_float_equal(fair_order_ahead_of_ms(world->order, &batch[9]->entry, "client 1", world->now_ms), 0, 1e-9);
+	assert_false(fair_order_share(world->order, &batch[9]->entry, "client 0", world->now_ms));
+	assert_true(fair_order_share(world->order, &batch[9]->entry, "client 1", world->now_ms));
+	assert_float_equal(fair_order_ahead_of_ms(world->order, &batch[9]->entry, "client 2", world->now_ms), 0, 1e-9);
+	struct job *other = add(world, 1, 100, 100), *third = add(world, 2, 120, 120);
+	settle(world, running);
+	assert_ptr_equal(serve(world), batch[9]);
+	assert_ptr_equal(serve(world), third); /* who has paid nothing comes first, ... */
+	struct job *next[2] = {serve(world), serve(world)};
+	assert_true(next[0] == other || next[1] == other); /* ... then the one with the batch and the one who shared in turns */
+	assert_true(next[0] == batch[1] || next[1] == batch[1]);
+	while (serve(world))
+		;
+	for (int i = 0; i < 10; i++)
+		assert_true(batch[i]->done);
+	end(world);
+}
+
+/* It stays where it is when the other's line is longer, or is empty and far ahead; and what empties a line leaves nothing behind. */
+static void shared_work_stays_where_it_is_sooner(void **state)
+{
+	(void)state;
+	struct world *world = begin();
+	struct job *only = add(world, 0, 100, 100);
+	for (int i = 0; i < 3; i++)
+		add(world, 1, 100, 100);
+	assert_false(fair_order_share(world->order, &only->entry, "client 1", world->now_ms));
+	struct job *last = &world->jobs[3];
+	assert_true(fair_order_share(world->order, &last->entry, "client 2", world->now_ms));
+	assert_false(fair_order_share(world->order, &last->entry, "client 3", world->now_ms)); /* as soon */
+	fair_order_drop(world->order, &last->entry);
+	int left = 0;
+	while (serve(world))
+		left++;
+	assert_true(left == 3 && only->done);
+	end(world);
+}
+
 /* Idle ones are forgotten: a busy period of many clients that each come once does not grow. */
 static void everything_is_served_once(void **state)
 {
@@ -283,6 +332,8 @@ int main(void)
 		cmocka_unit_test(small_before_large_within_reason),
 		cmocka_unit_test(wanted_and_dropped),
 		cmocka_unit_test(work_ahead),
+		cmocka_unit_test(shared_work_goes_where_it_is_sooner),
+		cmocka_unit_test(shared_work_stays_where_it_is_sooner),
 		cmocka_unit_test(everything_is_served_once),
 		cmocka_unit_test(without_a_client),
 	};

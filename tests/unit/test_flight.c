@@ -81,9 +81,13 @@ static void test_all_get_the_image(void **state)
 	const double now = clock_now_ms();
 	struct guest a = guest_until(now + 1e5), b = guest_until(now + 2e5), c = guest_until(now + 1e5);
 	set_up(&f);
+	assert_int_equal(flights_find(f.flights, "\"1\""), 0);
 	assert_int_equal(board(&f, "\"1\"", &a), FLIGHT_OPENED);
 	assert_int_equal(board_other(&f, "\"1\"", &b), FLIGHT_JOINED);
 	assert_int_equal(board_other(&f, "\"2\"", &c), FLIGHT_OPENED);
+	assert_true(f.flight.number != 0 && f.other.number != 0 && f.flight.number != f.other.number);
+	assert_true(a.seat.flight == f.flight.number && b.seat.flight == f.flight.number && c.seat.flight == f.other.number);
+	assert_true(flights_find(f.flights, "\"1\"") == f.flight.number && flights_find(f.flights, "\"2\"") == f.other.number);
 	assert_true(f.deadline_ms == now + 2e5); /* of the later */
 	assert_true(flight_is_wanted(&f.flight));
 	struct finished_image *image = image_of("\"1\"");

@@ -9,9 +9,9 @@ static void it_is_what_is_stored(void **state)
 {
 	(void)state;
 	struct golden_picture first, second;
-	assert_int_equal(golden_render(renderer, NULL, NULL, &first), GOLDEN_PASSED);
+	assert_int_equal(golden_render(renderer, false, NULL, NULL, &first), GOLDEN_PASSED);
 	assert_true(golden_compare(&first, &golden_expected));
-	assert_int_equal(golden_render(renderer, NULL, NULL, &second), GOLDEN_PASSED);
+	assert_int_equal(golden_render(renderer, true, NULL, NULL, &second), GOLDEN_PASSED);
 	assert_true(golden_compare(&second, &first));
 }
 
@@ -25,7 +25,7 @@ static void it_makes_way(void **state)
 {
 	(void)state;
 	struct golden_picture picture;
-	assert_int_equal(golden_render(renderer, at_once, NULL, &picture), GOLDEN_CANCELLED);
+	assert_int_equal(golden_render(renderer, false, at_once, NULL, &picture), GOLDEN_CANCELLED);
 }
 
 /* Wherever it is. */
@@ -56,7 +56,8 @@ static bool finds(const char *file, const char *from, const char *to)
 	renderer = renderer_create(&params);
 	assert_non_null(renderer);
 	struct golden_picture picture;
-	const bool found = golden_render(renderer, NULL, NULL, &picture) != GOLDEN_PASSED || !golden_compare(&picture, &golden_expected);
+	const bool found =
+		golden_render(renderer, false, NULL, NULL, &picture) != GOLDEN_PASSED || !golden_compare(&picture, &golden_expected);
 	snprintf(command, sizeof command, "rm -r %s", folder);
 	assert_int_equal(system(command), 0);
 	return found;

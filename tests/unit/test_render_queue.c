@@ -3,6 +3,7 @@
 
 #include "server/clock.h"
 
+#include <math.h>
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,6 +12,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -113,6 +115,49 @@ static void previews_pass_a_batch(void **state)
 	assert_ptr_equal(serve(queue), &preview);
 	while (render_queue_depth(queue))
 		serve(queue);
+	render_queue_destroy(queue);
+}
+
+/* What two clients wait for is served in the line where that is sooner, whoever of them is still there; and how soon is known before. */
+static void joined_jobs_change_lines(void **state)
+{
+	(void)state;
+	struct render_queue *queue = render_queue_create(&(struct render_queue_limits){100, 1e9});
+	static struct picture batch[10];
+	double ahead_ms, own_ms;
+	for (int i = 0; i < 10; i++) {
+		init(&batch[i], 0, 3840, 2160);
+		batch[i].job.flight = (unsigned long)i + 1;
+		assert_true(render_queue_push(queue, &batch[i].job));
+	}
+	const double each_ms = batch[0].job.predicted_ms, backlog_ms = render_queue_backlog_ms(queue);
+	struct render_job *running = render_queue_pop(queue);
+	assert_false(render_queue_foresee(queue, 11, "client 0", &ahead_ms, &own_ms));
+	assert_true(render_queue_foresee(queue, running->flight, "client 0", &ahead_ms, &own_ms));
+	assert_float_equal(ahead_ms, 0, 1e-9);
+	assert_true(own_ms > 0.5 * each_ms && own_ms <= each_ms);
+	assert_true(render_queue_foresee(queue, 10, "client 0", &ahead_ms, &own_ms));
+	assert_true(ahead_ms > 8 * each_ms && ahead_ms <= 9 * each_ms);
+	assert_true(render_queue_foresee(queue, 10, "client 1", &ahead_ms, &own_ms));
+	assert_true(ahead_ms <= each_ms);
+	assert_float_equal(own_ms, each_ms, 1e-9);
+	char joiner[] = "client 1";
+	render_queue_share(queue, 11, joiner); /* nobody's */
+	render_queue_share(queue, 10, joiner);
+	memset(joiner, 'x', sizeof joiner - 1); /* has left */
+	assert_true(fabs(render_queue_backlog_ms(queue) - backlog_ms) < each_ms);
+	render_queue_settle(queue, running, each_ms);
+	struct render_job *joined = render_queue_pop(queue);
+	assert_ptr_equal(joined, &batch[9].job);
+	assert_string_equal(joined->client, "client 1");
+	render_queue_settle(queue, joined, 1);
+	render_queue_pass(queue, joined); /* its next turn is that client's as well */
+	assert_true(render_queue_foresee(queue, 10, "client 0", &ahead_ms, &own_ms));
+	assert_true(ahead_ms <= each_ms);
+	int served = 0;
+	while (render_queue_depth(queue))
+		served += serve(queue) != NULL;
+	assert_int_equal(served, 9);
 	render_queue_destroy(queue);
 }
 
@@ -253,8 +298,12 @@ static void many_threads(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(limits),       cmocka_unit_test(previews_pass_a_batch), cmocka_unit_test(who_has_gone_makes_room),
-		cmocka_unit_test(waiting_ends), cmocka_unit_test(many_threads),
+		cmocka_unit_test(limits),
+		cmocka_unit_test(previews_pass_a_batch),
+		cmocka_unit_test(who_has_gone_makes_room),
+		cmocka_unit_test(joined_jobs_change_lines),
+		cmocka_unit_test(waiting_ends),
+		cmocka_unit_test(many_threads),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

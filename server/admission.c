@@ -98,10 +98,16 @@ static struct cost cost_of(struct service *service, const struct scene *const *s
 	return sum;
 }
 
-/* Of those who wait for droplets. */
+/* Of all who wait for droplets, and of those who come before the next of the request's client. */
 static double preparation_line_ms(const struct service *service)
 {
 	return (double)preparation_depth(service->preparation) * preparation_typical_ms(service->preparation);
+}
+
+static double preparation_before_ms(const struct request *request)
+{
+	struct preparation *preparation = request->service->preparation;
+	return (double)preparation_depth_before(preparation, request->client) * preparation_typical_ms(preparation);
 }
 
 /* When the answer would be there, counted from now. *alone_ms: if there were no others. */
@@ -110,7 +116,7 @@ static double predict(const struct request *request, const struct cost *cost, do
 	struct service *service = request->service;
 	double prepared_ms = cost->prepare_ms;
 	if (cost->prepare_ms > 0)
-		prepared_ms += preparation_line_ms(service);
+		prepared_ms += preparation_before_ms(request);
 	const double pace = cost_model_pace(service->costs);
 	const double ahead_ms = pace * render_queue_ahead_ms(service->queue, request->client, cost->render_ms);
 	*alone_ms = cost->prepare_ms + pace * cost->render_ms + cost->encode_ms;
@@ -169,10 +175,10 @@ bool admission_join(struct request *request, unsigned long flight, const struct 
 static double ahead_ms(const struct request *request, const struct cost *cost)
 {
 	struct service *service = request->service;
-	const double unprepared_ms = preparation_backlog_ms(service->preparation);
+	const double unprepared_ms = preparation_ahead_ms(service->preparation, request->client);
 	const double rendered_ms =
 		cost_model_pace(service->costs) * (render_queue_ahead_ms(service->queue, request->client, INFINITY) + unprepared_ms);
-	return cost->prepare_ms > 0 ? fmax(rendered_ms, preparation_line_ms(service)) : rendered_ms;
+	return cost->prepare_ms > 0 ? fmax(rendered_ms, preparation_before_ms(request)) : rendered_ms;
 }
 
 static bool take_place(struct request *request, struct promise *promise, const struct cost *cost)
@@ -237,9 +243,11 @@ void admission_refuse(struct request *request, const struct render_job *job)
 			    "Renders of %.1f megapixels are waiting, and at most %d may (--queue-mpixels).",
 			    service_queue_pixels(service) * 1e-6, config->queue_mpixels);
 	else
-		problem_set(&request->problem, PROBLEM_QUEUE_FULL,
-			    "No place is left: %d pictures may be in work, and half of them wait for droplets or maps (--queue-length).",
-			    config->queue_length);
+		problem_set(
+			&request->problem, PROBLEM_QUEUE_FULL,
+			"No place is left: %d pictures may be in work, half of them wait for droplets or maps, and of those each client's "
+			"as many as places are left (--queue-length).",
+			config->queue_length);
 	metrics_count_rejection(service->metrics, pixels ? REJECTED_PIXELS : REJECTED_FULL);
 }
 

@@ -2,7 +2,9 @@
 
 #include "renderer/file_replace.h"
 #include "renderer/log.h"
+#include "server/client_address.h"
 #include "server/entity_tag.h"
+#include "server/shares.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -14,19 +16,19 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { NAME_LENGTH_MAX = SCENE_NAME_MAX - 1, UPLOADS_MAX = 16, RECORD_VERSION = 1 };
+enum { NAME_LENGTH_MAX = SCENE_NAME_MAX - 1, RECORD_VERSION = 1 };
 
 struct asset_store {
 	char *files, *incoming; /* folders */
 	struct asset_limits limits;
 	pthread_mutex_t mutex;   /* one change of a name at a time, and what follows */
 	uint64_t incoming_bytes; /* of all uploads */
-	size_t uploads;
+	struct shares *uploads;
 };
 
 struct asset_upload {
 	struct asset_store *store;
-	char name[SCENE_NAME_MAX], temporary[PATH_MAX];
+	char name[SCENE_NAME_MAX], client[CLIENT_KEY_SIZE], temporary[PATH_MAX];
 	int fd;
 	uint64_t bytes, room;     /* that came; that all uploads may take */
 	enum asset_result spoilt; /* what became of writing it, when that failed once */
@@ -55,7 +57,8 @@ struct asset_store *asset_store_create(const char *state_dir, const struct asset
 	if (ok) {
 		store->limits = *limits;
 		pthread_mutex_init(&store->mutex, NULL);
-		ok = asprintf(&store->files, "%s/assets/files", state_dir) >= 0;
+		store->uploads = shares_create(ASSET_UPLOADS_MAX);
+		ok = store->uploads && asprintf(&store->files, "%s/assets/files", state_dir) >= 0;
 	}
 	if (ok)
 		ok = asprintf(&store->incoming, "%s/assets/incoming", state_dir) >= 0;
@@ -73,6 +76,7 @@ void asset_store_destroy(struct asset_store *store)
 	if (!store)
 		return;
 	pthread_mutex_destroy(&store->mutex);
+	shares_destroy(store->uploads);
 	free(store->files);
 	free(store->incoming);
 	free(store);
@@ -258,18 +262,19 @@ static enum asset_result failure(const char *doing, const char *path)
 }
 
 /* Admits an upload. Within the mutex. */
-static enum asset_result admit(struct asset_store *store, const char *name, uint64_t announced, uint64_t *room)
+static enum asset_result admit(struct asset_upload *upload, uint64_t announced)
 {
+	struct asset_store *store = upload->store;
 	const struct asset_limits *limits = &store->limits;
 	size_t count;
 	uint64_t bytes;
-	usage_beside(store, name, &count, &bytes);
-	*room = limits->total_bytes > bytes ? limits->total_bytes - bytes : 0;
-	if (count >= limits->count || store->incoming_bytes + announced > *room || *room == 0)
+	usage_beside(store, upload->name, &count, &bytes);
+	upload->room = limits->total_bytes > bytes ? limits->total_bytes - bytes : 0;
+	if (count >= limits->count || store->incoming_bytes + announced > upload->room || upload->room == 0)
 		return ASSET_FULL;
-	if (store->uploads >= UPLOADS_MAX)
+	if (!shares_allow(store->uploads, upload->client))
 		return ASSET_BUSY;
-	store->uploads++;
+	shares_take(store->uploads, upload->client);
 	return ASSET_OK;
 }
 
@@ -287,7 +292,8 @@ static bool open_temporary(struct asset_upload *upload)
 	return upload->fd >= 0;
 }
 
-enum asset_result asset_upload_begin(struct asset_store *store, const char *name, uint64_t announced, struct asset_upload **upload)
+enum asset_result asset_upload_begin(struct asset_store *store, const char *name, uint64_t announced, const char *client,
+				     struct asset_upload **upload)
 {
 	if (announced > store->limits.file_bytes)
 		return ASSET_TOO_LARGE;
@@ -298,9 +304,10 @@ enum asset_result asset_upload_begin(struct asset_store *store, const char *name
 	begun->store = store;
 	begun->fd = -1;
 	snprintf(begun->name, sizeof begun->name, "%s", name);
+	snprintf(begun->client, sizeof begun->client, "%s", client);
 	digest_begin(&begun->digest);
 	pthread_mutex_lock(&store->mutex);
-	enum asset_result result = admit(store, name, announced, &begun->room);
+	enum asset_result result = admit(begun, announced);
 	pthread_mutex_unlock(&store->mutex);
 	if (result != ASSET_OK) {
 		free(begun);
@@ -326,7 +333,7 @@ void asset_upload_destroy(struct asset_upload *upload)
 	}
 	pthread_mutex_lock(&upload->store->mutex);
 	upload->store->incoming_bytes -= upload->bytes;
-	upload->store->uploads--;
+	shares_give(upload->store->uploads, upload->client);
 	pthread_mutex_unlock(&upload->store->mutex);
 	free(upload);
 }

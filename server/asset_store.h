@@ -19,12 +19,15 @@ struct asset_limits {
 	size_t count;
 };
 
+/* Uploads that may come in at a time. */
+enum { ASSET_UPLOADS_MAX = 16 };
+
 enum asset_result {
 	ASSET_OK,
 	ASSET_MISSING,   /* there is none of that name */
 	ASSET_TOO_LARGE, /* larger than one may be */
 	ASSET_FULL,      /* more than there may be, or no space on the disk */
-	ASSET_BUSY,      /* too many are coming in */
+	ASSET_BUSY,      /* too many are coming in, or of this client (shares.h) */
 	ASSET_UNWANTED,  /* the condition does not hold */
 	ASSET_FAILED     /* the log has the reason */
 };
@@ -73,8 +76,10 @@ enum asset_result asset_store_delete(struct asset_store *store, const char *name
 
 /* --- uploads: one thread at a time each -------------------------------------------------------------------------------------------- */
 
-/* Begins to take a picture in for a name, of `announced` bytes (0: unknown). ASSET_OK: *upload is the caller's. */
-enum asset_result asset_upload_begin(struct asset_store *store, const char *name, uint64_t announced, struct asset_upload **upload);
+/* Begins to take a picture in for a name, of `announced` bytes (0: unknown) and from a client (its key). ASSET_OK: *upload is the caller's.
+ */
+enum asset_result asset_upload_begin(struct asset_store *store, const char *name, uint64_t announced, const char *client,
+				     struct asset_upload **upload);
 /* Takes NULL. */
 void asset_upload_destroy(struct asset_upload *upload);
 

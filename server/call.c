@@ -97,8 +97,10 @@ void call_end_render(struct request *request, const struct render_job *job)
 enum MHD_Result call_refuse_computing(struct request *request)
 {
 	metrics_count_rejection(request->service->metrics, REJECTED_FULL);
-	return response_send_new_problem(request, PROBLEM_COMPUTERS_FULL, "%d such calls are waiting, and no more may.",
-					 request->service->config->queue_length);
+	return response_send_new_problem(
+		request, PROBLEM_COMPUTERS_FULL,
+		"Such calls are waiting: at most %d may, and of one client as many as places are left (--queue-length).",
+		request->service->config->queue_length);
 }
 
 enum MHD_Result call_refuse_render(struct request *request, const struct render_job *job)

@@ -2,7 +2,9 @@
 
 #include "renderer/log.h"
 #include "server/clock.h"
+#include "server/shares.h"
 
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -13,6 +15,8 @@ enum { ROOM_MS = 5 };
 struct preparation {
 	struct droplet_store *store;
 	struct render_queue *waiting, *queue;
+	pthread_mutex_t mutex; /* of the places in `waiting`, as its clients have them */
+	struct shares *places;
 	pthread_t thread;
 	_Atomic int holders; /* jobs that hold tables */
 	_Atomic double busy_since_ms, typical_ms;
@@ -49,12 +53,41 @@ static bool find(struct preparation *preparation, struct render_job *job)
 	return job->droplets != NULL;
 }
 
+static bool push_waiting(struct preparation *preparation, struct render_job *job)
+{
+	pthread_mutex_lock(&preparation->mutex);
+	bool taken = shares_allow(preparation->places, job->client);
+	if (!taken)
+		job->refusal = RENDER_REFUSED_COUNT;
+	/* Within the mutex: the thread gives the place back when it has the job. */
+	taken = taken && render_queue_push(preparation->waiting, job);
+	if (taken)
+		shares_take(preparation->places, job->client);
+	pthread_mutex_unlock(&preparation->mutex);
+	return taken;
+}
+
+static void pass_waiting(struct preparation *preparation, struct render_job *job)
+{
+	pthread_mutex_lock(&preparation->mutex);
+	render_queue_pass(preparation->waiting, job);
+	shares_take(preparation->places, job->client);
+	pthread_mutex_unlock(&preparation->mutex);
+}
+
+static void leave_waiting(struct preparation *preparation, const struct render_job *job)
+{
+	pthread_mutex_lock(&preparation->mutex);
+	shares_give(preparation->places, job->client);
+	pthread_mutex_unlock(&preparation->mutex);
+}
+
 bool preparation_push(struct preparation *preparation, struct render_job *job)
 {
 	if (!scene_has_clouds(job->scene))
 		return render_queue_push(preparation->queue, job);
 	if (!find(preparation, job))
-		return render_queue_push(preparation->waiting, job);
+		return push_waiting(preparation, job);
 	if (render_queue_push(preparation->queue, job))
 		return true;
 	preparation_release(preparation, job);
@@ -63,8 +96,10 @@ bool preparation_push(struct preparation *preparation, struct render_job *job)
 
 void preparation_pass(struct preparation *preparation, struct render_job *job)
 {
-	const bool ready = !scene_has_clouds(job->scene) || find(preparation, job);
-	render_queue_pass(ready ? preparation->queue : preparation->waiting, job);
+	if (!scene_has_clouds(job->scene) || find(preparation, job))
+		render_queue_pass(preparation->queue, job);
+	else
+		pass_waiting(preparation, job);
 }
 
 /* --- the thread ------------------------------------------------------------------------------------------------------------------- */
@@ -114,6 +149,7 @@ static bool prepare(struct preparation *preparation, struct render_job *job)
 
 static void run(struct preparation *preparation, struct render_job *job)
 {
+	leave_waiting(preparation, job);
 	const bool ready = prepare(preparation, job);
 	render_queue_settle(preparation->waiting, job, job->prepared_ms);
 	if (ready)
@@ -143,6 +179,14 @@ static void *prepare_all(void *argument)
 
 /* --- life ------------------------------------------------------------------------------------------------------------------------- */
 
+static void destroy(struct preparation *preparation)
+{
+	render_queue_destroy(preparation->waiting);
+	shares_destroy(preparation->places);
+	pthread_mutex_destroy(&preparation->mutex);
+	free(preparation);
+}
+
 struct preparation *preparation_create(struct droplet_store *store, struct render_queue *queue, const struct render_queue_limits *limits)
 {
 	struct preparation *preparation = calloc(1, sizeof *preparation);
@@ -153,11 +197,12 @@ struct preparation *preparation_create(struct droplet_store *store, struct rende
 	preparation->store = store;
 	preparation->queue = queue;
 	preparation->waiting = render_queue_create(limits);
-	if (preparation->waiting && pthread_create(&preparation->thread, NULL, prepare_all, preparation) == 0)
+	preparation->places = shares_create(limits->jobs);
+	pthread_mutex_init(&preparation->mutex, NULL);
+	if (preparation->waiting && preparation->places && pthread_create(&preparation->thread, NULL, prepare_all, preparation) == 0)
 		return preparation;
 	log_error("preparation_create: no queue or no thread");
-	render_queue_destroy(preparation->waiting);
-	free(preparation);
+	destroy(preparation);
 	return NULL;
 }
 
@@ -167,8 +212,7 @@ void preparation_destroy(struct preparation *preparation)
 		return;
 	render_queue_close(preparation->waiting);
 	pthread_join(preparation->thread, NULL);
-	render_queue_destroy(preparation->waiting);
-	free(preparation);
+	destroy(preparation);
 }
 
 static bool is_over(struct render_job *job, void *context)
@@ -179,8 +223,10 @@ static bool is_over(struct render_job *job, void *context)
 
 void preparation_drop_over(struct preparation *preparation)
 {
-	for (struct render_job *job; (job = render_queue_remove(preparation->waiting, is_over, NULL));)
+	for (struct render_job *job; (job = render_queue_remove(preparation->waiting, is_over, NULL));) {
+		leave_waiting(preparation, job);
 		job->finished(job);
+	}
 }
 
 bool preparation_needs(const struct preparation *preparation, const struct scene *scene)
@@ -198,9 +244,17 @@ double preparation_pixels(struct preparation *preparation)
 	return render_queue_pixels(preparation->waiting);
 }
 
-double preparation_backlog_ms(struct preparation *preparation)
+size_t preparation_depth_before(struct preparation *preparation, const char *client)
 {
-	return render_queue_backlog_ms(preparation->waiting);
+	pthread_mutex_lock(&preparation->mutex);
+	const size_t before = shares_before(preparation->places, client);
+	pthread_mutex_unlock(&preparation->mutex);
+	return before;
+}
+
+double preparation_ahead_ms(struct preparation *preparation, const char *client)
+{
+	return render_queue_ahead_ms(preparation->waiting, client, INFINITY);
 }
 
 double preparation_busy_ms(const struct preparation *preparation)

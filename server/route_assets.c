@@ -1,7 +1,7 @@
 /* /v1/assets: uploaded pictures.
  *
- * The body of a PUT goes to a file as it comes. When it is whole the request waits, suspended, for the thread that has it decoded: that
- * looks through the picture and puts it under its name.
+ * The body of a PUT goes to a file as it comes, and is refused as soon as it is known to be no use. When it is whole the request waits,
+ * suspended, for the thread that has it decoded: that looks through the picture and puts it under its name.
  */
 #include "server/routes.h"
 
@@ -23,6 +23,8 @@
 
 /* Uploads are few at a time: one that never ends must not keep its place. */
 #define UPLOAD_MS_MAX 900000.0
+
+#define NO_PICTURE "An asset is a PNG or an EXR."
 
 struct asset_work {
 	struct work examine; /* for the decoder */
@@ -66,31 +68,41 @@ static struct asset_condition condition_of(const struct request *request)
 	return (struct asset_condition){request_header(request, "If-Match"), request_header(request, "If-None-Match")};
 }
 
-static enum MHD_Result send_result(struct request *request, enum asset_result result)
+static void state_result(struct request *request, enum asset_result result)
 {
 	const struct asset_limits *limits = asset_store_limits(request->service->assets);
+	struct problem *problem = &request->problem;
 	switch (result) {
 	case ASSET_MISSING:
-		return response_send_new_problem(request, PROBLEM_NOT_FOUND, "There is no asset of this name; /v1/assets lists them.");
+		problem_set(problem, PROBLEM_NOT_FOUND, "There is no asset of this name; /v1/assets lists them.");
+		return;
 	case ASSET_TOO_LARGE:
-		return response_send_new_problem(request, PROBLEM_TOO_LARGE, "An asset has at most %llu bytes.",
-						 (unsigned long long)limits->file_bytes);
+		problem_set(problem, PROBLEM_TOO_LARGE, "An asset has at most %llu bytes.", (unsigned long long)limits->file_bytes);
+		return;
 	case ASSET_FULL:
-		return response_send_new_problem(
-			request, PROBLEM_STORAGE_FULL,
-			"All assets together are at most %zu and %llu bytes, and the disk's room: delete some first.", limits->count,
-			(unsigned long long)limits->total_bytes);
+		problem_set(problem, PROBLEM_STORAGE_FULL,
+			    "All assets together are at most %zu and %llu bytes, and the disk's room: delete some first.", limits->count,
+			    (unsigned long long)limits->total_bytes);
+		return;
 	case ASSET_BUSY:
-		return response_send_new_problem(request, PROBLEM_UPLOADS_FULL, "Many uploads are coming in, and no more may.");
+		problem_set(problem, PROBLEM_UPLOADS_FULL,
+			    "Uploads are coming in: at most %d may, and of one client as many as places are left.", ASSET_UPLOADS_MAX);
+		return;
 	case ASSET_UNWANTED:
-		return response_send_new_problem(request, PROBLEM_PRECONDITION,
-						 "If-Match or If-None-Match asks for another state of this asset than it has.");
+		problem_set(problem, PROBLEM_PRECONDITION, "If-Match or If-None-Match asks for another state of this asset than it has.");
+		return;
 	case ASSET_OK:
 	case ASSET_FAILED:
 		break;
 	}
-	return response_send_new_problem(request, PROBLEM_INTERNAL, "The asset could not be kept. The log has the reason under %s.",
-					 request->id);
+	problem_set(problem, PROBLEM_INTERNAL, "The asset could not be kept. The log has the reason under %s.", request->id);
+}
+
+static enum MHD_Result send_result(struct request *request, enum asset_result result)
+{
+	problem_finish(&request->problem);
+	state_result(request, result);
+	return response_send_problem(request);
 }
 
 static void tag_of(const char *hash, char tag[static ENTITY_TAG_SIZE])
@@ -211,11 +223,42 @@ enum MHD_Result route_asset_begin(struct request *request)
 	work->condition = condition_of(request);
 	enum asset_result result = asset_store_check(service->assets, work->name, &work->condition);
 	if (result == ASSET_OK)
-		result = asset_upload_begin(service->assets, work->name, announced_bytes(request), &work->upload);
+		result = asset_upload_begin(service->assets, work->name, announced_bytes(request), request->client, &work->upload);
 	return result == ASSET_OK ? MHD_YES : send_result(request, result);
 }
 
-/* A body that is no use any more is read to its end all the same, up to the limit: only then do all clients hear the answer. */
+/* Before the answer goes out: who has it may begin the next upload. */
+static void end_upload(struct asset_work *work)
+{
+	asset_upload_destroy(work->upload);
+	work->upload = NULL;
+}
+
+static bool is_picture(const struct asset_work *work)
+{
+	enum image_format format;
+	return work->magic_size == sizeof work->magic && picture_file_recognise(work->magic, &format);
+}
+
+static bool is_whole(const struct request *request)
+{
+	const struct asset_work *work = request->work;
+	uint64_t size;
+	asset_upload_fd(work->upload, &size);
+	return size == announced_bytes(request);
+}
+
+/* Nothing of what is still to come would change the answer. */
+static enum MHD_Result refuse_rest(struct request *request, enum asset_result result)
+{
+	if (result == ASSET_OK)
+		problem_set(&request->problem, PROBLEM_MEDIA_TYPE, NO_PICTURE);
+	else
+		state_result(request, result);
+	end_upload(request->work);
+	return response_send_problem_past(request);
+}
+
 enum MHD_Result route_asset_take(struct request *request, const char *data, size_t size)
 {
 	struct asset_work *work = request->work;
@@ -223,12 +266,10 @@ enum MHD_Result route_asset_take(struct request *request, const char *data, size
 		return MHD_NO;
 	for (size_t i = 0; i < size && work->magic_size < sizeof work->magic; i++)
 		work->magic[work->magic_size++] = (unsigned char)data[i];
-	enum asset_result result = asset_upload_append(work->upload, data, size);
-	if (result == ASSET_TOO_LARGE)
-		return response_refuse_body(request, asset_store_limits(request->service->assets)->file_bytes);
-	if (work->received == ASSET_OK)
-		work->received = result;
-	return MHD_YES;
+	work->received = asset_upload_append(work->upload, data, size);
+	const bool is_bad = work->received != ASSET_OK || (work->magic_size == sizeof work->magic && !is_picture(work));
+	/* A body that is whole is answered as all others are, and its connection goes on. */
+	return is_bad && !is_whole(request) ? refuse_rest(request, work->received) : MHD_YES;
 }
 
 static enum MHD_Result send_put(struct request *request)
@@ -248,13 +289,6 @@ static enum MHD_Result send_put(struct request *request)
 	tag_of(work->hash, tag);
 	response_set(response, "ETag", tag);
 	return response_send(request, work->created ? MHD_HTTP_CREATED : MHD_HTTP_NO_CONTENT, response);
-}
-
-/* Before the answer goes out: who has it may begin the next upload. */
-static void end_upload(struct asset_work *work)
-{
-	asset_upload_destroy(work->upload);
-	work->upload = NULL;
 }
 
 static void examine(struct work *base)
@@ -277,19 +311,19 @@ static enum MHD_Result finish_put(struct request *request)
 {
 	struct asset_work *work = request->work;
 	struct service *service = request->service;
-	enum image_format format;
 	if (work->received != ASSET_OK) {
 		end_upload(work);
 		return send_result(request, work->received);
 	}
-	if (work->magic_size < sizeof work->magic || !picture_file_recognise(work->magic, &format)) {
+	if (!is_picture(work)) {
 		end_upload(work);
-		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE, "An asset is a PNG or an EXR.");
+		return response_send_new_problem(request, PROBLEM_MEDIA_TYPE, NO_PICTURE);
 	}
 	/* However long the body took to come: unless the client says otherwise, looking through it has as long as any other answer. */
 	if (!request_header(request, "X-Timeout-Ms"))
 		work->deadline_ms = clock_now_ms() + service->config->timeout_ms;
 	work->examine.run = examine;
+	work->examine.client = request->client;
 	request_suspend(request, send_put);
 	if (!worker_pool_try(service->decoders, &work->examine)) {
 		work->result = ASSET_BUSY;

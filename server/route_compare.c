@@ -346,6 +346,7 @@ static bool start_run(struct compare_work *work)
 	run->job.finished = on_rendered;
 	run->decode.run = decode;
 	run->decode.is_over = waits_in_vain;
+	run->decode.client = work->request->client;
 	admission_price(work->request, &run->job);
 	run->decoding_since_ms = clock_now_ms();
 	return scene_assets_take(service->maps, run->scene, &run->assets) ? push(work, run)
@@ -369,6 +370,7 @@ enum MHD_Result route_compare(struct request *request)
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
 	work->request = request;
 	work->compare.run = compare;
+	work->compare.client = request->client;
 	request->work = work;
 	request->work_destroy = work_destroy;
 

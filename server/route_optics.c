@@ -214,6 +214,7 @@ enum MHD_Result route_optics(struct request *request)
 		return response_send_new_problem(request, PROBLEM_INTERNAL, "Out of memory.");
 	work->request = request;
 	work->work.run = run;
+	work->work.client = request->client;
 	request->work = work;
 	request->work_destroy = work_destroy;
 	read_parameters(request, work);

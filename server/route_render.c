@@ -422,7 +422,7 @@ static void start(struct render_work *work)
 	}
 	admission_price(request, &work->job);
 	snprintf(work->client, sizeof work->client, "%s", request->client); /* the request may end before its work */
-	work->job.client = work->client;
+	work->job.client = work->decode.client = work->client;
 	work->job.flight = work->flight.number;
 	work->decoding_since_ms = clock_now_ms();
 	if (!(scene_assets_take(service->maps, &work->input.scene, &work->assets) ? preparation_push(service->preparation, &work->job)

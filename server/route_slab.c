@@ -63,7 +63,8 @@ static enum MHD_Result send_numbers(struct request *request, unsigned status, st
 static enum MHD_Result refuse_tracing(struct request *request)
 {
 	metrics_count_rejection(request->service->metrics, REJECTED_FULL);
-	return response_send_new_problem(request, PROBLEM_TRACINGS_FULL, "%d photon tracings are waiting, and no more may.",
+	return response_send_new_problem(request, PROBLEM_TRACINGS_FULL,
+					 "Photon tracings are waiting: at most %d may, and of one client as many as places are left.",
 					 SERVICE_TRACINGS_MAX);
 }
 
@@ -198,6 +199,7 @@ static enum MHD_Result enqueue(struct request *request)
 	const struct service *service = request->service;
 	work->work.run = run;
 	work->work.is_over = waits_in_vain;
+	work->work.client = request->client;
 	work->queued_ms = clock_now_ms();
 	/* Suspended first: a worker may be done before worker_pool_try returns. */
 	request_suspend(request, finish);

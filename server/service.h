@@ -28,8 +28,8 @@ enum service_state {
 	SERVICE_FAILED      /* a restart is needed */
 };
 
-/* Photon tracings that may wait for the one that runs. */
-enum { SERVICE_TRACINGS_MAX = 4 };
+/* Photon tracings that may wait for the one that runs; of one client half of them (shares.h). */
+enum { SERVICE_TRACINGS_MAX = 8 };
 
 struct MHD_Daemon;
 

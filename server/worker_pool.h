@@ -1,6 +1,7 @@
 /* A few threads for work that needs a processor but no GPU: encoding images, computing optics, tracing photons. Any thread.
  *
- * The backlog is bounded, so that frames waiting to be encoded cannot fill the memory.
+ * The backlog is bounded, so that frames waiting to be encoded cannot fill the memory. Clients share the places in it (shares.h) and the
+ * threads' time (fair_order.h); what is of one client, or of nobody, runs in the order in which it came.
  */
 #ifndef STRATUS_SERVER_WORKER_POOL_H
 #define STRATUS_SERVER_WORKER_POOL_H
@@ -12,7 +13,7 @@
 struct work {
 	void (*run)(struct work *work);
 	bool (*is_over)(struct work *work); /* late, or does nobody wait for it any more? Quick; NULL: never */
-	struct work *next;                  /* of the pool */
+	const char *client;                 /* key of whom it is for, read while it is handed over. NULL: nobody's in particular */
 };
 
 struct worker_pool;
@@ -24,10 +25,10 @@ struct worker_pool *worker_pool_create(size_t threads, size_t backlog, int nice)
 /* Does all work that was accepted, then ends. Takes NULL. */
 void worker_pool_destroy(struct worker_pool *pool);
 
-/* Hands work over; false at once when the backlog is full. */
+/* Hands work over; false at once when the backlog is full, or its client has its share of it. */
 bool worker_pool_try(struct worker_pool *pool, struct work *work);
 
-/* Hands work over, waiting for room. Never from the pool's own threads. */
+/* Hands work over, waiting for room, whatever its client's share. Never from the pool's own threads. */
 void worker_pool_wait(struct worker_pool *pool, struct work *work);
 
 /* Runs waiting work that is over at once, by the caller. */

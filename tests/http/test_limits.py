@@ -224,7 +224,7 @@ def test_slow_requests_are_closed(strict):
         (b"GET /he", b"a"),
         (POST + b"Content-Length: 1000\r\n\r\n{", b" "),
         (POST + b"Transfer-Encoding: chunked\r\n\r\n", b"1\r\n \r\n"),
-        (b"PUT /v1/assets/slow HTTP/1.1\r\n" + HOST + b"Content-Type: image/png\r\nContent-Length: 1000\r\n\r\n", b"x"),
+        (b"PUT /v1/assets/slow HTTP/1.1\r\n" + HOST + b"Content-Type: image/png\r\nContent-Length: 1000\r\n\r\n\x89PNG\r\n\x1a\n", b"x"),
     ]
     with concurrent.futures.ThreadPoolExecutor(len(openings)) as pool:
         ends = [pool.submit(trickle, strict, *opening) for opening in openings]

@@ -2,6 +2,7 @@
 import concurrent.futures
 import contextlib
 import http.client
+import json
 import os
 import pathlib
 import random
@@ -106,11 +107,60 @@ def is_swept(daemon):
     return wait_for(lambda: not any((daemon.log.parent / "state" / "assets" / "incoming").iterdir()))
 
 
-def test_bad_pictures_are_known_early(daemon):
-    """By their first bytes and by their header, however much is said to follow: nothing is decoded and nothing is kept."""
+def begin_upload(daemon, first, headers=b"Content-Length: 60000000", address="127.0.0.1"):
+    """Sends the headers and the first bytes of a body, and nothing more."""
+    client = socket.create_connection(("127.0.0.1", daemon.port), timeout=180, source_address=(address, 0))
+    client.sendall(b"PUT /v1/assets/begun HTTP/1.1\r\nHost: x\r\n" + headers + b"\r\n\r\n" + first)
+    return client
+
+
+def read_all(client):
+    with client:
+        return b"".join(iter(lambda: client.recv(65536), b""))
+
+
+CHUNKED = b"Transfer-Encoding: chunked"
+
+
+@pytest.mark.parametrize("headers, first", [(b"Content-Length: 60000000", b"GIF89a__"), (CHUNKED, b"20\r\nGIF89a" + bytes(26) + b"\r\n")], ids=["sized", "chunked"])
+def test_no_pictures_are_known_by_their_first_bytes(start_daemon, headers, first):
+    """While the rest is still to come, which is waited for much longer than this test."""
+    daemon = start_daemon("--read-timeout-s", "3600", "--log-format", "json")
+    refused = 'stratus_problems_total{type="unsupported-media-type"}'
+    assert daemon.metric(refused) == 0
+    answer = read_all(begin_upload(daemon, first, headers))
+    head, body = answer.split(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 415 ") and b"Connection: close" in head
+    assert json.loads(body)["type"] == "urn:stratus:problem:unsupported-media-type"
+    logged = lambda: [line for line in map(json.loads, daemon.lines) if line.get("path") == "/v1/assets/begun"]
+    assert wait_for(logged)
+    assert [line["status"] for line in logged()] == [415] and daemon.metric(refused) == 1
+    assert is_swept(daemon)
+
+
+def test_a_whole_body_that_is_no_picture_leaves_its_connection(daemon):
+    connection = daemon.connect()
+    for _ in range(3):
+        connection.request("PUT", "/v1/assets/bad", b"GIF89a" + bytes(30))
+        answer = connection.getresponse()
+        assert answer.status == 415 and answer.getheader("Connection") != "close" and answer.read()
+        assert connection.sock
+    connection.close()
+
+
+def test_no_room_is_known_in_mid_body(start_daemon):
+    daemon = start_daemon("--read-timeout-s", "3600", "--assets-disk-mb", "1")
+    piece = b"\x89PNG\r\n\x1a\n" + bytes((1 << 20) - 8)
+    client = begin_upload(daemon, b"%x\r\n%b\r\n" % (len(piece), piece), CHUNKED)
+    client.sendall(b"10\r\n" + bytes(16) + b"\r\n")
+    assert read_all(client).startswith(b"HTTP/1.1 507 ")
+    assert is_swept(daemon)
+
+
+def test_bad_pictures_are_known_by_their_header(daemon):
+    """However much is said to follow: nothing is decoded and nothing is kept."""
     wide = png_by_hand(100000, 4, b"\0" * 100)
-    for data, status, kind in ((b"GIF89a" + bytes(1 << 20), 415, "unsupported-media-type"), (wide, 422, "invalid-asset")):
-        assert_problem(daemon.request("PUT", "/v1/assets/bad", data), status, kind)
+    assert_problem(daemon.request("PUT", "/v1/assets/bad", wide), 422, "invalid-asset")
     assert is_swept(daemon)
 
 

@@ -55,7 +55,7 @@ static enum asset_result upload_if(const char *name, char letter, size_t size, c
 	char bytes[2000], hash[DIGEST_SIZE];
 	struct asset_upload *upload;
 	memset(bytes, letter, sizeof bytes);
-	enum asset_result result = asset_upload_begin(store, name, 0, &upload);
+	enum asset_result result = asset_upload_begin(store, name, 0, "me", &upload);
 	for (size_t at = 0; result == ASSET_OK && at < size; at += 300)
 		result = asset_upload_append(upload, bytes, size - at < 300 ? size - at : 300);
 	if (result == ASSET_OK)
@@ -158,11 +158,11 @@ static void test_limits(void **unused)
 	(void)unused;
 	struct asset_upload *other;
 	assert_int_equal(upload("large", 'a', 1001), ASSET_TOO_LARGE);
-	assert_int_equal(asset_upload_begin(store, "large", 1001, &other), ASSET_TOO_LARGE);
+	assert_int_equal(asset_upload_begin(store, "large", 1001, "me", &other), ASSET_TOO_LARGE);
 	assert_int_equal(upload("a", 'a', 1000), ASSET_OK);
 	assert_int_equal(upload("b", 'b', 1000), ASSET_OK);
 	assert_int_equal(upload("c", 'c', 501), ASSET_FULL);
-	assert_int_equal(asset_upload_begin(store, "c", 501, &other), ASSET_FULL);
+	assert_int_equal(asset_upload_begin(store, "c", 501, "me", &other), ASSET_FULL);
 	assert_int_equal(upload("b", 'B', 1000), ASSET_OK); /* in place of its own */
 	assert_int_equal(upload("c", 'c', 100), ASSET_OK);
 	assert_int_equal(upload("d", 'd', 1), ASSET_FULL); /* three are enough */
@@ -184,30 +184,54 @@ static void test_uploads_count_while_they_come_in(void **unused)
 	static const char bytes[1000];
 	struct asset_upload *first[3], *more[32];
 	for (int i = 0; i < 3; i++)
-		assert_int_equal(asset_upload_begin(store, "a", 0, &first[i]), ASSET_OK);
+		assert_int_equal(asset_upload_begin(store, "a", 0, "me", &first[i]), ASSET_OK);
 	assert_int_equal(asset_upload_append(first[0], bytes, 1000), ASSET_OK);
 	assert_int_equal(asset_upload_append(first[1], bytes, 1000), ASSET_OK);
 	assert_int_equal(asset_upload_append(first[2], bytes, 501), ASSET_FULL);
 	asset_upload_destroy(first[2]);
 	asset_upload_destroy(first[0]);
 	int admitted = 0;
-	while (asset_upload_begin(store, "b", 1, &more[admitted]) == ASSET_OK)
-		admitted++;
-	assert_int_equal(admitted, 15); /* and one that is left of the first */
-	assert_int_equal(asset_upload_begin(store, "b", 1, &first[0]), ASSET_BUSY);
+	char client[32] = "me";
+	/* As many clients as it takes: each has a part only. */
+	for (int i = 0; admitted < ASSET_UPLOADS_MAX - 1; i++) {
+		snprintf(client, sizeof client, "client %d", i);
+		admitted += asset_upload_begin(store, "b", 1, client, &more[admitted]) == ASSET_OK;
+	}
+	assert_int_equal(asset_upload_begin(store, "b", 1, "new", &first[0]), ASSET_BUSY); /* one is left of the first */
 	while (admitted > 0)
 		asset_upload_destroy(more[--admitted]);
 	asset_upload_destroy(first[1]);
 	/* What has its name counts once, whoever still has hold of the upload. */
 	char hash[DIGEST_SIZE];
 	bool created;
-	assert_int_equal(asset_upload_begin(store, "a", 1000, &first[0]), ASSET_OK);
+	assert_int_equal(asset_upload_begin(store, "a", 1000, "me", &first[0]), ASSET_OK);
 	assert_int_equal(asset_upload_append(first[0], bytes, 1000), ASSET_OK);
 	assert_int_equal(asset_upload_commit(first[0], &facts, &always, &created, hash), ASSET_OK);
 	assert_int_equal(upload("b", 'b', 1000), ASSET_OK);
 	asset_upload_destroy(first[0]);
 	assert_int_equal(upload("c", 'c', 501), ASSET_FULL);
 	assert_int_equal(upload("c", 'c', 500), ASSET_OK);
+	assert_int_equal(count_files("incoming"), 0);
+}
+
+/* One that begins upload after upload and ends none leaves half of the places to others, and gives back what it ends. */
+static void test_uploads_are_shared(void **unused)
+{
+	(void)unused;
+	struct asset_upload *of_one[ASSET_UPLOADS_MAX], *refused, *of_others[2];
+	int count = 0;
+	while (count < ASSET_UPLOADS_MAX && asset_upload_begin(store, "a", 1, "one", &of_one[count]) == ASSET_OK)
+		count++;
+	assert_int_equal(count, ASSET_UPLOADS_MAX / 2);
+	assert_int_equal(asset_upload_begin(store, "a", 1, "another", &of_others[0]), ASSET_OK);
+	assert_int_equal(asset_upload_begin(store, "b", 1, "a third", &of_others[1]), ASSET_OK);
+	asset_upload_destroy(of_one[--count]);
+	assert_int_equal(asset_upload_begin(store, "a", 1, "one", &refused), ASSET_BUSY); /* 7 of its own, 7 free: one fewer than before */
+	asset_upload_destroy(of_others[0]);
+	asset_upload_destroy(of_others[1]);
+	assert_int_equal(asset_upload_begin(store, "a", 1, "one", &of_one[count++]), ASSET_OK);
+	while (count > 0)
+		asset_upload_destroy(of_one[--count]);
 	assert_int_equal(count_files("incoming"), 0);
 }
 
@@ -304,7 +328,7 @@ static void test_sweep_spares_the_living(void **unused)
 	struct asset_upload *running;
 	char hash[DIGEST_SIZE];
 	bool created;
-	assert_int_equal(asset_upload_begin(store, "a", 0, &running), ASSET_OK);
+	assert_int_equal(asset_upload_begin(store, "a", 0, "me", &running), ASSET_OK);
 	assert_int_equal(asset_upload_append(running, "zzz", 3), ASSET_OK);
 	asset_store_destroy(asset_store_create(state, &limits));
 	assert_int_equal(asset_upload_commit(running, &facts, &always, &created, hash), ASSET_OK);
@@ -427,6 +451,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(test_what_is_kept, open_store, close_store),
 		cmocka_unit_test_setup_teardown(test_limits, open_store, close_store),
 		cmocka_unit_test_setup_teardown(test_uploads_count_while_they_come_in, open_store, close_store),
+		cmocka_unit_test_setup_teardown(test_uploads_are_shared, open_store, close_store),
 		cmocka_unit_test_setup_teardown(test_conditions, open_store, close_store),
 		cmocka_unit_test_setup_teardown(test_list, open_store, close_store),
 		cmocka_unit_test_setup_teardown(test_killed, open_store, close_store),

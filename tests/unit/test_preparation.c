@@ -162,6 +162,63 @@ static void full_line(void **state)
 	finish(fixture);
 }
 
+/* Where nothing is prepared, since the thread waits for room: one client has half of the line, another's job is prepared next. */
+static void clients_share_the_line(void **state)
+{
+	(void)state;
+	struct fixture *fixture = start(1.5, 4);
+	for (int i = 0; i < JOBS; i++)
+		fixture->waiters[i].job.client = i < 4 ? "one" : "another";
+	assert_true(push(fixture, 0));
+	await_depth(fixture, 0, 1);
+	assert_true(push(fixture, 1));
+	await_depth(fixture, 0, 1); /* in work, waiting for room */
+	assert_true(push(fixture, 2));
+	assert_true(push(fixture, 3));
+	fixture->waiters[5].job.client = "one";
+	assert_false(push(fixture, 5));
+	assert_int_equal(fixture->waiters[5].job.refusal, RENDER_REFUSED_COUNT);
+	assert_int_equal(preparation_depth_before(fixture->preparation, "another"), 0);
+	assert_int_equal(preparation_depth_before(fixture->preparation, "one"), 2);
+	assert_true(push(fixture, 4));
+	assert_int_equal(preparation_depth_before(fixture->preparation, "one"), 3);
+	await_depth(fixture, 3, 1);
+	const int order[] = {0, 1, 4, 2, 3};
+	for (int i = 0; i < 5; i++)
+		assert_int_equal(render_next(fixture), order[i]);
+	/* Their places are free again. */
+	assert_int_equal(preparation_depth_before(fixture->preparation, "one"), 0);
+	assert_true(push(fixture, 5));
+	assert_int_equal(render_next(fixture), 5);
+	finish(fixture);
+}
+
+static void dropped_jobs_leave_their_places(void **state)
+{
+	(void)state;
+	struct fixture *fixture = start(1.5, 4);
+	for (int i = 0; i < JOBS; i++)
+		fixture->waiters[i].job.client = "one";
+	assert_true(push(fixture, 0));
+	await_depth(fixture, 0, 1);
+	assert_true(push(fixture, 1));
+	await_depth(fixture, 0, 1);
+	for (int i = 2; i < 4; i++) {
+		assert_true(push(fixture, i));
+		fixture->waiters[i].left = true;
+	}
+	assert_false(push(fixture, 4));
+	preparation_drop_over(fixture->preparation);
+	assert_true(fixture->waiters[2].ended && fixture->waiters[3].ended);
+	assert_int_equal(preparation_depth_before(fixture->preparation, "one"), 0);
+	assert_true(push(fixture, 4));
+	assert_true(push(fixture, 5));
+	const int order[] = {0, 1, 4, 5};
+	for (int i = 0; i < 4; i++)
+		assert_int_equal(render_next(fixture), order[i]);
+	finish(fixture);
+}
+
 /* Nobody renders: no more is prepared than may be held. */
 static void as_much_is_held_as_may_be(void **state)
 {
@@ -261,6 +318,8 @@ int main(void)
 		cmocka_unit_test(prepared_in_turn),
 		cmocka_unit_test(same_droplets_go_on_together),
 		cmocka_unit_test(full_line),
+		cmocka_unit_test(clients_share_the_line),
+		cmocka_unit_test(dropped_jobs_leave_their_places),
 		cmocka_unit_test(as_much_is_held_as_may_be),
 		cmocka_unit_test(others_may_hold_all),
 		cmocka_unit_test(jobs_that_are_over),

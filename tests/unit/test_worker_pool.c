@@ -100,6 +100,55 @@ static void test_sweep(void **state)
 	}
 }
 
+/* Order of running, noted by the tasks themselves. */
+struct noted {
+	struct work work;
+	int *count, *order, number;
+};
+
+static void note(struct work *work)
+{
+	struct noted *noted = (struct noted *)((char *)work - offsetof(struct noted, work));
+	noted->order[(*noted->count)++] = noted->number;
+}
+
+/* One that has handed over as much as it may is refused more; another finds a place, and the thread, before the rest of the first. */
+static void test_clients_share(void **state)
+{
+	(void)state;
+	enum { BACKLOG = 12, HALF = BACKLOG / 2 };
+	struct worker_pool *pool = worker_pool_create(1, BACKLOG, 0);
+	struct task first = {.work = {.run = run, .client = "one"}, .hold = true};
+	struct noted tasks[BACKLOG];
+	char key[] = "another"; /* not needed any longer than the handing over */
+	int count = 0, order[BACKLOG];
+	assert_non_null(pool);
+	for (int i = 0; i < BACKLOG; i++)
+		tasks[i] = (struct noted){.work = {.run = note, .client = "one"}, .count = &count, .order = order, .number = i};
+	assert_true(worker_pool_try(pool, &first.work));
+	await(&first.started);
+	for (int i = 0; i < HALF; i++)
+		assert_true(worker_pool_try(pool, &tasks[i].work));
+	assert_false(worker_pool_try(pool, &tasks[HALF].work));
+	assert_int_equal(worker_pool_waiting(pool), HALF);
+	tasks[HALF].work.client = tasks[HALF + 1].work.client = key;
+	assert_true(worker_pool_try(pool, &tasks[HALF].work));
+	assert_true(worker_pool_try(pool, &tasks[HALF + 1].work));
+	key[0] = 'x';
+	tasks[HALF + 2].work.client = "a third";
+	assert_true(worker_pool_try(pool, &tasks[HALF + 2].work));
+	assert_int_equal(worker_pool_waiting(pool), HALF + 3);
+	usleep(20000); /* which the first pays: more than what the others take */
+	first.hold = false;
+	worker_pool_destroy(pool);
+	assert_int_equal(count, HALF + 3);
+	/* What came first of either, whatever that took; then each by itself in its order. */
+	assert_true((order[0] == HALF && order[1] == HALF + 2) || (order[0] == HALF + 2 && order[1] == HALF));
+	for (int i = 0, next = 0; i < count; i++)
+		if (order[i] < HALF)
+			assert_int_equal(order[i], next++);
+}
+
 static void test_threads_stand_back(void **state)
 {
 	(void)state;
@@ -119,6 +168,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_backlog_is_bounded),
 		cmocka_unit_test(test_sweep),
+		cmocka_unit_test(test_clients_share),
 		cmocka_unit_test(test_threads_stand_back),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -276,7 +276,8 @@ UNWANTED = {
 def test_who_writes_first_hears_why(narrow, head, chunked, status):
     shown = f"Authorization: {narrow.shown['Authorization']}\r\n".encode()
     head = head.replace(b"KEY", shown) + (CODED if chunked else by_length(LARGE))
-    check_refusal(tell_all(narrow, head, in_chunks(bytes(LARGE)) if chunked else bytes(LARGE)), status)
+    body = PNG[:8] + bytes(LARGE - 8)  # else an upload is refused for its first bytes
+    check_refusal(tell_all(narrow, head, in_chunks(body) if chunked else body), status)
 
 
 def test_full_storage_is_heard_of(narrow):

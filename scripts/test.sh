@@ -147,7 +147,7 @@ run_sanitized() {
 # What threads share, with the sanitizer that sees a lock missing.
 run_threads() {
 	local log=$results/threads name is_alone=1 programs=()
-	for name in render_queue fair_order flight image_cache intake worker_pool cache api_keys asset_store cost_model decoder lingering log; do
+	for name in render_queue fair_order flight image_cache intake worker_pool cache api_keys asset_store cost_model decoder lingering log shares; do
 		programs+=("build/san-thread/tests/test_$name")
 	done
 	echo "== again with SAN=thread"

@@ -413,8 +413,8 @@ def test_too_large_a_body_over_tls(secure):
     connection.putheader("Authorization", secure.shown["Authorization"])
     connection.endheaders()
     try:
-        for _ in range(40):
-            connection.send(b"10000\r\n" + bytes(65536) + b"\r\n")
+        for begin in [b"\x89PNG\r\n\x1a\n"] + 39 * [b""]:
+            connection.send(b"10000\r\n" + begin.ljust(65536, b"\0") + b"\r\n")
             time.sleep(0.005)
     except OSError:
         pass

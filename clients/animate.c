@@ -1,6 +1,7 @@
 /* stratus animate: a scene over time, as a film or as frames. */
 #include "clients/batch_run.h"
 #include "clients/commands.h"
+#include "clients/file_type.h"
 #include "clients/film.h"
 #include "clients/film_run.h"
 #include "clients/member_range.h"
@@ -11,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { FRAMES_MAX = 1000000 };
 
@@ -39,6 +41,8 @@ static bool is_complete(const struct animate_options *options)
 	struct member_range range;
 	if (!options->output)
 		client_error("animate wants -o FILM.mp4, FILM.webm or FOLDER");
+	else if (file_type_is_picture(options->output) && !film_is_named(options->output))
+		client_error("%s: animate writes .mp4 and .webm, or frames into a folder", options->output);
 	else if ((options->from != NULL) != (options->until != NULL) || (options->day && options->from))
 		client_error("the sun moves over a --day or --from a time --until another");
 	else if (options->duration_s * options->frames_per_s > FRAMES_MAX)
@@ -122,7 +126,7 @@ static json_t *scene_of_frame(const struct animate_options *options, const struc
 	const double share = count > 1 ? (double)i / (count - 1) : 0;
 	const double clouds_s = start_of(base) + options->speed * i / options->frames_per_s;
 	json_t *scene = json_deep_copy(base);
-	bool good = scene && set_value(scene, "clouds.time_s", json_real(clouds_s)) && scene_set_format(scene, ".png");
+	bool good = scene && set_value(scene, "clouds.time_s", json_real(clouds_s)) && scene_set_format(scene, ".png", false);
 	if (course->moves)
 		good = good && set_sun(scene, &options->place, course->begin_s + share * (course->end_s - course->begin_s));
 	for (int r = 0; good && r < options->ramps.count; r++) {
@@ -149,6 +153,17 @@ static bool make_frames(const struct animate_options *options, const struct cour
 	return good;
 }
 
+/* A longer film was made into the folder before: who takes all of its frames gets the end of that one too. */
+static void tell_of_frames_beyond(const struct client *client, const char *folder, int count)
+{
+	char *path;
+	if (client->quiet || asprintf(&path, "%s/%06d.png", folder, count + 1) < 0)
+		return;
+	if (access(path, F_OK) == 0)
+		fprintf(stderr, "%s and what follows it are of an earlier film and stay; this one has %d frames\n", path, count);
+	free(path);
+}
+
 static int shoot(const struct client *client, const struct animate_options *options, const struct scene_list *list)
 {
 	if (film_is_named(options->output)) {
@@ -156,6 +171,7 @@ static int shoot(const struct client *client, const struct animate_options *opti
 		return film_run(client, &settings, list);
 	}
 	const struct batch_settings settings = {.pool = options->pool, .folder = options->output, .what = "frames", .anew = options->anew};
+	tell_of_frames_beyond(client, options->output, list->count);
 	return batch_run(client, &settings, list);
 }
 

@@ -125,7 +125,7 @@ static int print_list(const struct client *client, const json_t *assets)
 		else
 			printf("%-24s %-12s %5lld x %-5lld %lld\n", name, type, (long long)width, (long long)height, (long long)bytes);
 	}
-	return fflush(stdout) == 0 ? CLIENT_OK : CLIENT_UNWRITABLE;
+	return client_end_output();
 }
 
 static int list(const struct client *client, const struct asset_options *options)

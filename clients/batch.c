@@ -34,7 +34,7 @@ static int make_list(const struct batch_options *options, const char *file, cons
 		for (int s = 0; file && s < options->source.sets.count; s++)
 			if (!scene_set(list->item[i].scene, options->source.sets.text[s]))
 				return CLIENT_USAGE;
-		if (options->format && !scene_set_format(list->item[i].scene, *options->format == 'e' ? ".exr" : ".png"))
+		if (options->format && !scene_set_format(list->item[i].scene, *options->format == 'e' ? ".exr" : ".png", false))
 			return CLIENT_USAGE;
 	}
 	return status;

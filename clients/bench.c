@@ -100,6 +100,18 @@ static int write_json(const char *path, json_t *object)
 	return written ? CLIENT_OK : CLIENT_UNWRITABLE;
 }
 
+/* What would be lost at the end is told before the load. */
+static bool has_place_for_results(const struct bench_options *options)
+{
+	return (!options->json || output_file_check(options->json)) && (!options->plot || plot_check(options->plot));
+}
+
+/* The first that went wrong is the status; what can be written is written all the same. */
+static int worse(int status, int other)
+{
+	return status == CLIENT_OK || status == CLIENT_INTERRUPTED ? (other == CLIENT_OK ? status : other) : status;
+}
+
 /* Are tables wanted on standard output? */
 static bool is_for_people(const struct client *client, const struct bench_options *options)
 {
@@ -110,10 +122,16 @@ static int run_once(const struct client *client, const struct bench_options *opt
 {
 	struct load_result result = {0};
 	int status = load_run(client, mix, &options->load, &result);
-	if (status == CLIENT_OK && is_for_people(client, options))
+	const bool measured = status == CLIENT_OK || status == CLIENT_INTERRUPTED;
+	if (status == CLIENT_INTERRUPTED)
+		client_error("interrupted after %.3g s that were measured; %llu requests had no answer yet and are not counted",
+			     result.seconds, (unsigned long long)result.unanswered);
+	if (measured && is_for_people(client, options)) {
 		report_print(stdout, &options->load, mix, &result);
-	if (status == CLIENT_OK && options->json)
-		status = write_json(options->json, report_json(&options->load, mix, &result));
+		status = worse(status, client_end_output());
+	}
+	if (measured && options->json)
+		status = worse(status, write_json(options->json, report_json(&options->load, mix, &result)));
 	if (status == CLIENT_OK && histogram_count(result.good) == 0)
 		status = CLIENT_REFUSED;
 	load_result_finish(&result);
@@ -125,12 +143,17 @@ static int run_sweep(const struct client *client, const struct bench_options *op
 	const struct sweep_settings settings = {.load = options->load, .p99_ms = options->p99_ms};
 	struct sweep sweep;
 	int status = sweep_run(client, mix, &settings, &sweep);
-	if (status == CLIENT_OK && is_for_people(client, options))
+	const bool measured = status == CLIENT_OK || (status == CLIENT_INTERRUPTED && sweep.steps > 0);
+	if (status == CLIENT_INTERRUPTED)
+		client_error("interrupted: the sweep has %d whole steps and did not come to its end", sweep.steps);
+	if (measured && is_for_people(client, options)) {
 		sweep_print(stdout, &sweep);
-	if (status == CLIENT_OK && options->json)
-		status = write_json(options->json, sweep_json(&sweep));
-	if (status == CLIENT_OK && options->plot)
-		status = sweep_draw(&sweep, options->plot);
+		status = worse(status, client_end_output());
+	}
+	if (measured && options->json)
+		status = worse(status, write_json(options->json, sweep_json(&sweep)));
+	if (measured && options->plot)
+		status = worse(status, sweep_draw(&sweep, options->plot));
 	sweep_finish(&sweep);
 	return status;
 }
@@ -145,11 +168,14 @@ static int run_bench(struct client *client, void *given, char **words)
 		return words[0] ? run_compare(options->old, words[0], options->json && strcmp(options->json, "-") == 0) : CLIENT_USAGE;
 	if (!scene_source_take(&options->source, words[0]) || !is_complete(options))
 		return CLIENT_USAGE;
+	if (!has_place_for_results(options))
+		return CLIENT_UNWRITABLE;
 	if (options->load.connections == 0)
 		options->load.connections = options->load.rate > 0 || options->sweep ? OPEN_CONNECTIONS : CLOSED_CONNECTIONS;
 	if (client->timeout_s > 0)
 		options->load.timeout_s = client->timeout_s + 1; /* the daemon's answer that it was too late should still be heard */
 	int status = make_mix(client, options, &mix);
+	load_catch_interrupts();
 	if (status == CLIENT_OK)
 		status = options->sweep ? run_sweep(client, options, mix) : run_once(client, options, mix);
 	mix_destroy(mix);
@@ -195,7 +221,9 @@ const struct command command_bench = {
 		"stands still is charged with all who would have come meanwhile. Without it a number of clients each ask when they were\n"
 		"answered.\n",
 	.notes = "In a mix {\"scene\": {}, \"vary\": {\"sun.elevation_deg\": [5.0, 60.0]}} draws that member for every request.\n"
-		 "A request is given up after --timeout and a second more, or 60 seconds.\n",
+		 "A request is given up after --timeout and a second more, or 60 seconds. Interrupted (130), it tells what was measured "
+		 "until\n"
+		 "then; of a sweep its whole steps.\n",
 	.options = rows,
 	.size = sizeof(struct bench_options),
 	.defaults = &defaults,

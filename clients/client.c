@@ -1,7 +1,9 @@
 #include "clients/client.h"
 
+#include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 const struct option_row client_options[] = {
 	TEXT_ROW("server", 0, "URL", WORDS_ANY, struct client, server, "of the daemon (STRATUS_SERVER, else http://127.0.0.1:8080)"),
@@ -22,4 +24,13 @@ void client_error(const char *format, ...)
 	vfprintf(stderr, format, args);
 	fputc('\n', stderr);
 	va_end(args);
+}
+
+int client_end_output(void)
+{
+	errno = 0;
+	if (fflush(stdout) == 0 && !ferror(stdout))
+		return CLIENT_OK;
+	client_error("standard output: %s", errno ? strerror(errno) : "not all of it could be written");
+	return CLIENT_UNWRITABLE;
 }

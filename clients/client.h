@@ -29,4 +29,7 @@ extern const struct option_row client_options[];
 /* "stratus: ..." on standard error. */
 __attribute__((format(printf, 1, 2))) void client_error(const char *format, ...);
 
+/* Everything printed on standard output is there: an enum client_exit, after a message when it is not CLIENT_OK. */
+int client_end_output(void);
+
 #endif

@@ -164,7 +164,7 @@ static int save_answer(const struct client *client, const struct compare_options
 	json_decref(figures);
 	if (!printed)
 		client_error("the server answers no comparison");
-	return !printed ? CLIENT_REFUSED : fflush(stdout) == 0 ? CLIENT_OK : CLIENT_UNWRITABLE;
+	return !printed ? CLIENT_REFUSED : client_end_output();
 }
 
 static void print_timings(const struct client *client, const struct http_response *response)

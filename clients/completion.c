@@ -165,7 +165,7 @@ static int run_completion(struct client *client, void *options, char **words)
 		return CLIENT_USAGE;
 	}
 	print_bash();
-	return fflush(stdout) == 0 && !ferror(stdout) ? CLIENT_OK : CLIENT_UNWRITABLE;
+	return client_end_output();
 }
 
 const struct command command_completion = {

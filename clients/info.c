@@ -94,7 +94,7 @@ static int print(json_t *info, const struct info_options *options, const char *p
 		print_json(info);
 	else
 		print_text(info);
-	return fflush(stdout) == 0 && !ferror(stdout) ? CLIENT_OK : CLIENT_UNWRITABLE;
+	return client_end_output();
 }
 
 static int run_info(struct client *client, void *options, char **words)

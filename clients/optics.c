@@ -71,7 +71,7 @@ static int show(const struct optics_options *options, const json_t *optics)
 	} else if (!options->output) {
 		optics_print_table(stdout, optics);
 	}
-	if (fflush(stdout) != 0 || ferror(stdout))
+	if (client_end_output() != CLIENT_OK)
 		return CLIENT_UNWRITABLE;
 	return options->output ? optics_draw(optics, options->output) : CLIENT_OK;
 }

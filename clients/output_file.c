@@ -127,3 +127,22 @@ bool output_file_end(char *temporary, const char *path, bool whole)
 	free(temporary);
 	return done || !whole;
 }
+
+bool output_file_check(const char *path)
+{
+	struct stat status;
+	if (strcmp(path, "-") == 0)
+		return true;
+	const bool there = stat(path, &status) == 0;
+	if (there && !S_ISREG(status.st_mode)) {
+		if (S_ISDIR(status.st_mode))
+			errno = EISDIR;
+		else if (access(path, W_OK) == 0)
+			return true;
+		client_error("%s: %s", path, strerror(errno));
+		return false;
+	}
+	char *target = there ? realpath(path, NULL) : NULL, *temporary = output_file_begin(target ? target : path);
+	free(target);
+	return temporary && output_file_end(temporary, path, false);
+}

@@ -9,6 +9,9 @@
  * output; devices and pipes are written directly. false after a message. */
 bool output_file_write(const char *path, const void *data, size_t size);
 
+/* Can a file be written there? Asked before work whose result would be lost. false after a message. */
+bool output_file_check(const char *path);
+
 /* For what another program writes: makes an empty file beside the final name, and returns its name for output_file_end. NULL after a
  * message. */
 char *output_file_begin(const char *path);

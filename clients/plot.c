@@ -22,6 +22,20 @@ bool plot_is_named(const char *path)
 	return strcasecmp(extension_of(path), ".png") == 0 || strcasecmp(extension_of(path), ".svg") == 0;
 }
 
+static void tell_of_gnuplot(void)
+{
+	client_error("figures want gnuplot, which is not installed (apt-get install gnuplot-nox)");
+}
+
+bool plot_check(const char *path)
+{
+	if (system("command -v gnuplot >/dev/null") != 0) {
+		tell_of_gnuplot();
+		return false;
+	}
+	return output_file_check(path);
+}
+
 /* false after a message, when a whole figure found no place. */
 static bool finish(struct plot *plot, bool whole)
 {
@@ -69,7 +83,7 @@ int plot_end(struct plot *plot)
 	const int status = pclose(plot->to);
 	bool good = status == 0;
 	if (WIFEXITED(status) && WEXITSTATUS(status) == 127)
-		client_error("figures want gnuplot, which is not installed (apt-get install gnuplot-nox)");
+		tell_of_gnuplot();
 	else if (!good)
 		client_error("%s: gnuplot failed", plot->path);
 	good = finish(plot, good) && good;

@@ -19,6 +19,9 @@ struct plot {
 /* .png or .svg? */
 bool plot_is_named(const char *path);
 
+/* Is there gnuplot, and can the figure be put there? Asked before work whose result would be lost. false after a message. */
+bool plot_check(const char *path);
+
 /* Starts gnuplot with terminal, output, and axes set. false after a message. */
 bool plot_begin(struct plot *plot, const char *path, int width, int height);
 

@@ -21,7 +21,7 @@ static int print_list(const struct client *client, const json_t *presets)
 		else
 			printf("%-18s %s\n", text(preset, "name"), text(preset, "title"));
 	}
-	return fflush(stdout) == 0 ? CLIENT_OK : CLIENT_UNWRITABLE;
+	return client_end_output();
 }
 
 static int print_scene(const json_t *presets, const char *name)
@@ -31,7 +31,7 @@ static int print_scene(const json_t *presets, const char *name)
 		return CLIENT_USAGE;
 	json_dumpf(scene, stdout, JSON_INDENT(2));
 	putchar('\n');
-	return fflush(stdout) == 0 ? CLIENT_OK : CLIENT_UNWRITABLE;
+	return client_end_output();
 }
 
 static int run_presets(struct client *client, void *options, char **words)

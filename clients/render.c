@@ -1,5 +1,6 @@
 /* stratus render: one scene in, one image file out. */
 #include "clients/commands.h"
+#include "clients/file_type.h"
 #include "clients/http.h"
 #include "clients/output_file.h"
 #include "clients/problem.h"
@@ -25,6 +26,8 @@ static bool is_complete(const struct render_options *options)
 		client_error("render wants -o FILE, or -o - for standard output");
 	else if (strcmp(options->output, "-") == 0 && isatty(STDOUT_FILENO))
 		client_error("an image is no text for a terminal; redirect standard output or name a file");
+	else if (file_type_is_picture(options->output) && !scene_format_of(options->output))
+		client_error("%s: render writes .png and .exr; what else there is, other programs make of them", options->output);
 	else if (options->watch && (!options->source.file || strcmp(options->source.file, "-") == 0 || strcmp(options->output, "-") == 0))
 		client_error("--watch wants a scene in a file, and a file for the image");
 	else
@@ -37,7 +40,7 @@ static int compose_scene(const struct client *client, const struct render_option
 {
 	json_t *scene;
 	int status = scene_source_load(client, &options->source, &scene);
-	if (status == CLIENT_OK && !(scene_set_format(scene, options->output) && (*body = json_dumps(scene, JSON_COMPACT)))) {
+	if (status == CLIENT_OK && !(scene_set_format(scene, options->output, true) && (*body = json_dumps(scene, JSON_COMPACT)))) {
 		client_error("out of memory");
 		status = CLIENT_USAGE;
 	}
@@ -104,7 +107,7 @@ static int run_render(struct client *client, void *given, char **words)
 
 static const struct option_row rows[] = {
 	TEXT_ROW("output", 'o', "FILE", WORDS_FILE, struct render_options, output,
-		 "the image; .png or .exr chooses the format unless the scene does; - is standard output"),
+		 "the image; .png or .exr is its format, whatever the scene says; - is standard output, in the scene's"),
 	FLAG_ROW("watch", 0, struct render_options, watch, "render again whenever the scene's file is saved, until interrupted"),
 	SCENE_SOURCE_ROWS(struct render_options, source),
 	{0}};

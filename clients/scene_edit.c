@@ -70,12 +70,17 @@ cleanup:
 	return done;
 }
 
-bool scene_set_format(json_t *scene, const char *path)
+const char *scene_format_of(const char *path)
 {
 	const char *dot = strrchr(path, '.');
-	const char *format = !dot ? NULL : strcasecmp(dot, ".png") == 0 ? "png" : strcasecmp(dot, ".exr") == 0 ? "exr" : NULL;
+	return !dot ? NULL : strcasecmp(dot, ".png") == 0 ? "png" : strcasecmp(dot, ".exr") == 0 ? "exr" : NULL;
+}
+
+bool scene_set_format(json_t *scene, const char *path, bool anyway)
+{
+	const char *format = scene_format_of(path);
 	json_t *output = json_object_get(scene, "output");
-	if (!format || (output && !json_is_object(output)) || json_object_get(output, "format"))
+	if (!format || (output && !json_is_object(output)) || (!anyway && json_object_get(output, "format")))
 		return true; /* nothing to add; what is wrong with it, the server says */
 	if (output)
 		return json_object_set_new(output, "format", json_string(format)) == 0;

@@ -12,7 +12,10 @@ json_t *scene_read(const char *path);
  * after a message. */
 bool scene_set(json_t *scene, const char *assignment);
 
-/* Lets the extension of a file (.png, .exr) choose output.format unless the scene does. false: out of memory. */
-bool scene_set_format(json_t *scene, const char *path);
+/* "png" or "exr", as the extension of a file says; NULL: another one. */
+const char *scene_format_of(const char *path);
+
+/* Lets the extension of a file (.png, .exr) choose output.format, over the scene's own when `anyway`. false: out of memory. */
+bool scene_set_format(json_t *scene, const char *path, bool anyway);
 
 #endif

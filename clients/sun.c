@@ -91,7 +91,7 @@ static int print(const struct sun_options *options, const json_t *table)
 	} else {
 		print_table(table);
 	}
-	return fflush(stdout) == 0 && !ferror(stdout) ? CLIENT_OK : CLIENT_UNWRITABLE;
+	return client_end_output();
 }
 
 static int run_sun(struct client *client, void *given, char **words)

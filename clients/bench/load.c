@@ -7,6 +7,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,6 +47,21 @@ struct load {
 	uint64_t planned; /* of an open load, warm-up included */
 	bool failed;
 };
+
+static volatile sig_atomic_t interrupted;
+
+static void interrupt(int number)
+{
+	(void)number;
+	interrupted = 1;
+}
+
+void load_catch_interrupts(void)
+{
+	const struct sigaction on_interrupt = {.sa_handler = interrupt, .sa_flags = SA_RESETHAND};
+	sigaction(SIGINT, &on_interrupt, NULL);
+	sigaction(SIGTERM, &on_interrupt, NULL);
+}
 
 static int64_t now_ns(void)
 {
@@ -290,14 +306,32 @@ static void await(struct load *load)
 		take_event(load, &events[i]);
 }
 
+/* The measured time ends here. Who waits for an answer is no error, and is told apart. */
+static void break_off(struct load *load)
+{
+	struct load_result *result = load->result;
+	const double measured_s = (double)(now_ns() - load->measure_ns) / SECOND_NS;
+	uint64_t asked = 0;
+	for (int i = 0; i < load->settings->connections; i++) {
+		const struct connection *connection = &load->connection[i];
+		asked += connection->state != CONNECTION_CLOSED && connection->state != CONNECTION_IDLE && connection->measured;
+	}
+	result->planned -= asked;
+	result->unanswered = asked;
+	while (load->due.count > 0)
+		result->unanswered += due_pop(&load->due) >= load->measure_ns;
+	if (measured_s < result->seconds)
+		result->seconds = measured_s > 0 ? measured_s : 0;
+}
+
 static void drive(struct load *load)
 {
 	load->begin_ns = load->next_ns = now_ns();
 	load->scan_ns = load->begin_ns + SCAN_NS;
 	load->measure_ns = load->begin_ns + (int64_t)(load->settings->warm_up_s * SECOND_NS);
 	load->end_ns = load->measure_ns + (int64_t)(load->settings->duration_s * SECOND_NS);
-	for (int64_t now = load->begin_ns; !load->failed && (plan_is_open(load, now) || load->busy > 0 || load->due.count > 0);
-	     now = now_ns()) {
+	for (int64_t now = load->begin_ns;
+	     !load->failed && !interrupted && (plan_is_open(load, now) || load->busy > 0 || load->due.count > 0); now = now_ns()) {
 		follow_plan(load, now);
 		await(load);
 		if (now >= load->scan_ns)
@@ -395,6 +429,10 @@ int load_run(const struct client *client, struct mix *mix, const struct load_set
 		load.failed = !create_load(&load, client);
 		if (!load.failed)
 			drive(&load);
+		if (interrupted && !load.failed) {
+			break_off(&load);
+			status = CLIENT_INTERRUPTED;
+		}
 		result->processor_s = processor_s() - before_s;
 		if (load.failed) {
 			client_error("out of memory");

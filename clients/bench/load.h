@@ -55,10 +55,15 @@ struct load_result {
 	int connections;         /* most that were open at once */
 	uint64_t late;           /* requests that had to wait for a connection: --connections was too small */
 	double processor_s;      /* that the load generator took itself, warm-up included */
+	uint64_t unanswered;     /* of an interrupted load: due or asked then, without an answer yet, and not in `planned` */
 	double good_seconds_end; /* when the last good answer came, from the start of the measured time */
 };
 
-/* Runs a load; `mix` is not prepared yet. An enum client_exit, after a message when not CLIENT_OK. load_result_finish in either case. */
+/* From now on SIGINT and SIGTERM end a load at once, with what was measured until then; a second one ends the process. */
+void load_catch_interrupts(void);
+
+/* Runs a load; `mix` is not prepared yet. An enum client_exit, after a message when not CLIENT_OK; CLIENT_INTERRUPTED: the result is that
+ * of the time until then. load_result_finish in any case. */
 int load_run(const struct client *client, struct mix *mix, const struct load_settings *settings, struct load_result *result);
 
 /* Takes a zeroed result. */

@@ -21,11 +21,17 @@ static uint64_t errors(const struct load_result *result)
 	return sum;
 }
 
+/* 0 of a load that was interrupted before it was measured. */
+static double rate_over(double count, double seconds)
+{
+	return seconds > 0 ? count / seconds : 0;
+}
+
 /* Good answers over the time in which they came: the planned time, or longer when they dragged on behind it. */
 static double goodput(const struct load_result *result)
 {
 	const double seconds = result->good_seconds_end > result->seconds ? result->good_seconds_end : result->seconds;
-	return (double)histogram_count(result->good) / seconds;
+	return rate_over((double)histogram_count(result->good), seconds);
 }
 
 /* --- for people --------------------------------------------------------------------------------------------------------------------- */
@@ -60,8 +66,8 @@ static void print_load(FILE *to, const struct load_settings *settings)
 
 static void print_counts(FILE *to, const struct load_result *result)
 {
-	fprintf(to, "asked %.2f/s, answered well %.2f/s, %.2f MB/s; ", (double)result->planned / result->seconds, goodput(result),
-		1e-6 * (double)result->bytes / result->seconds);
+	fprintf(to, "asked %.2f/s, answered well %.2f/s, %.2f MB/s; ", rate_over((double)result->planned, result->seconds), goodput(result),
+		rate_over(1e-6 * (double)result->bytes, result->seconds));
 	for (int status = 0; status < LOAD_STATUS_MAX; status++)
 		if (result->status[status])
 			fprintf(to, "%d: %llu  ", status, (unsigned long long)result->status[status]);
@@ -93,7 +99,7 @@ void report_print(FILE *to, const struct load_settings *settings, const struct m
 	for (int i = 0; i < result->stages; i++)
 		print_row(to, result->stage[i].name, result->stage[i].latency);
 	fprintf(to, "\n%d connections; the load itself took %.1f %% of a processor\n", result->connections,
-		100 * result->processor_s / (settings->warm_up_s + result->seconds));
+		100 * rate_over(result->processor_s, settings->warm_up_s + result->seconds));
 }
 
 /* --- for programs -------------------------------------------------------------------------------------------------------------------- */
@@ -157,8 +163,9 @@ json_t *report_json(const struct load_settings *settings, const struct mix *mix,
 				 settings->rate, "arrivals", settings->random_arrivals ? "random" : "even", "connections",
 				 settings->connections, "warm_up_s", settings->warm_up_s, "duration_s", settings->duration_s, "timeout_s",
 				 settings->timeout_s, "seed", (json_int_t)settings->seed);
-	return json_pack("{s:o, s:I, s:f, s:I, s:I, s:f, s:f, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I, s:i, s:I, s:f}", "load", load,
-			 "asked", (json_int_t)result->planned, "asked_per_s", (double)result->planned / result->seconds, "answers",
+	return json_pack("{s:o, s:f, s:I, s:I, s:f, s:I, s:I, s:f, s:f, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I, s:i, s:I, s:f}", "load",
+			 load, "measured_s", result->seconds, "unanswered", (json_int_t)result->unanswered, "asked",
+			 (json_int_t)result->planned, "asked_per_s", rate_over((double)result->planned, result->seconds), "answers",
 			 (json_int_t)answers(result), "errors", (json_int_t)errors(result), "good_per_s", goodput(result), "good_until_s",
 			 result->good_seconds_end, "status", statuses_json(result), "error", errors_json(result), "good",
 			 latency_json(result->good), "refused", latency_json(result->refused), "other", latency_json(result->other), "kind",

@@ -246,5 +246,5 @@ int run_compare(const char *old_path, const char *new_path, bool as_json)
 	finish_run(&new_run);
 	if (!good)
 		return CLIENT_USAGE;
-	return fflush(stdout) == 0 && !ferror(stdout) ? CLIENT_OK : CLIENT_UNWRITABLE;
+	return client_end_output();
 }

@@ -134,7 +134,10 @@ void sweep_print(FILE *to, const struct sweep *sweep)
 		fprintf(to, " %8lld %7.0f%s\n", (long long)refused, number(report, "errors") + (double)other,
 			sweep->step[i].borne ? "" : "  not borne");
 	}
-	fprintf(to, "\nknee: %.4g requests/s are borne", sweep->knee);
+	if (sweep->knee > 0)
+		fprintf(to, "\nknee: %.4g requests/s are borne", sweep->knee);
+	else
+		fputs("\nknee: none of these is borne", to);
 	if (sweep->beyond > 0)
 		fprintf(to, ", %.4g are not", sweep->beyond);
 	fputc('\n', to);

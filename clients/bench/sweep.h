@@ -27,8 +27,8 @@ struct sweep {
 };
 
 /* Half as much again each time until a rate is not borne, then between the two. A rate is borne when 99 % are answered well, at 95 % of the
- * rate at least (so that nothing piles up), within p99_ms. An enum client_exit, after a message when it is not CLIENT_OK. sweep_finish in
- * any case. */
+ * rate at least (so that nothing piles up), within p99_ms. An enum client_exit, after a message when it is not CLIENT_OK;
+ * CLIENT_INTERRUPTED (load_catch_interrupts): the steps are those that were whole. sweep_finish in any case. */
 int sweep_run(const struct client *client, struct mix *mix, const struct sweep_settings *settings, struct sweep *sweep);
 
 void sweep_print(FILE *to, const struct sweep *sweep);

@@ -112,6 +112,22 @@ def test_usage(service, stratus, tmp_path, options):
     assert not service.asked and os.listdir(tmp_path) == []
 
 
+@pytest.mark.parametrize("name", ["f.gif", "f.avi", "f.MOV", "f.mkv", "f.png", "f.exr"])
+def test_no_folder_under_the_name_of_a_film(service, stratus, tmp_path, name):
+    done = stratus(service, "animate", "-o", tmp_path / name)
+    assert done.returncode == 2 and ".mp4 and .webm" in done.stderr
+    assert not service.asked and os.listdir(tmp_path) == []
+
+
+def test_frames_of_a_longer_film_are_told(service, stratus, tmp_path):
+    command = ["animate", "--fps", "10", "-o", tmp_path / "out", "--duration"]
+    assert "earlier" not in stratus(service, *command, "0.4").stderr
+    assert "earlier" not in stratus(service, *command, "0.4").stderr
+    done = stratus(service, *command, "0.2")
+    assert done.returncode == 0 and f"{tmp_path / 'out' / '000003.png'} and what follows" in done.stderr
+    assert (tmp_path / "out" / "000004.png").exists()
+
+
 PARIS = ["--latitude", "48.8566", "--longitude", "2.3522"]
 
 

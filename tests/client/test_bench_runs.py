@@ -2,10 +2,15 @@
 import json
 import os
 import shutil
+import signal
+import subprocess
+import threading
 import time
 
 import numpy
 import pytest
+
+from conftest import BUILD
 
 SLOW_S = 0.4  # of an answer: what a busy machine adds does not matter beside it
 
@@ -59,6 +64,92 @@ def test_a_bound_of_latency_ends_a_sweep(service, stratus):
     service.reply = late(10**9)
     done = sweep(stratus, service, "--rate", "20", "--within-ms", "100", "--duration", "0.1")
     assert done.returncode == 1 and "not even" in done.stderr
+
+
+# --- results that would be lost ---------------------------------------------------------------------------------------------------------------
+
+FOREVER = ["--duration", "3600", "--warm-up", "0", "--get", "/x"]
+
+
+@pytest.mark.parametrize("options", [["--json", "no/a.json"], ["--json", "."], ["--sweep", "--json", "no/a.json"], ["--sweep", "--plot", "no/a.png"]])
+def test_what_has_no_place_is_told_before_the_load(service, stratus, tmp_path, options):
+    done = stratus(service, "bench", *FOREVER, *options, cwd=tmp_path, timeout=60)
+    assert done.returncode == 4 and (f"{options[-1]}: " in done.stderr or "gnuplot" in done.stderr)
+    assert not service.asked and os.listdir(tmp_path) == []
+
+
+def test_no_gnuplot_is_told_before_the_load(service, stratus, tmp_path):
+    done = stratus(service, "bench", "--sweep", *FOREVER, "--plot", tmp_path / "a.png", env={"PATH": str(tmp_path)}, timeout=60)
+    assert done.returncode == 4 and "gnuplot" in done.stderr
+    assert not service.asked and os.listdir(tmp_path) == []
+
+
+def test_old_results_survive_the_look_at_their_place(service, stratus, tmp_path):
+    (tmp_path / "a.json").write_text("old")
+    service.reply = lambda handler, *_: handler.problem(503)
+    assert sweep(stratus, service, "--rate", "100", "--duration", "0.1", "--json", tmp_path / "a.json").returncode == 1
+    assert (tmp_path / "a.json").read_text() == "old" and os.listdir(tmp_path) == ["a.json"]
+
+
+@pytest.mark.parametrize("options", [["--duration", "0.2"], ["--duration", "0.1", "--sweep", "--rate", "50"]])
+def test_tables_that_nobody_gets_are_an_error(service, options):
+    service.reply = late(5)  # all of a sweep's first step
+    with open("/dev/full", "w") as full:
+        command = [BUILD / "stratus", "bench", "--server", service.url, "--warm-up", "0", "--get", "/x", *options]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=180)
+    assert done.returncode == 4 and "standard output" in done.stderr, done.stderr
+
+
+def interrupted(service, asked, *options):
+    """A load on a service that answers no more after some requests, interrupted as soon as `asked` have come."""
+    command = [BUILD / "stratus", "bench", "--server", service.url, "--warm-up", "0", "--get", "/x", *map(str, options)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        for _ in range(6000):
+            if len(service.asked) >= asked or process.poll() is not None:
+                break
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    return process.returncode, out, err
+
+
+def held(end, answered):
+    def reply(handler, number, body):
+        if number >= answered:
+            end.wait(120)
+        handler.picture()
+
+    return reply
+
+
+def test_a_load_that_is_interrupted_tells_what_it_measured(service, tmp_path):
+    end = threading.Event()
+    service.reply = held(end, 30)
+    try:
+        # Three clients that ask when they were answered: at the 33rd request 30 answers have come, and three have not.
+        status, out, err = interrupted(service, 33, "--duration", 3600, "--connections", 3, "--json", tmp_path / "a.json")
+    finally:
+        end.set()
+    assert status == 130 and "interrupted" in err and "3 requests had no answer" in err, err
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert found["asked"] == found["good"]["count"] == 30 and found["unanswered"] == 3 and found["errors"] == 0
+    assert 0 < found["measured_s"] < 3600 and found["asked_per_s"] == pytest.approx(30 / found["measured_s"], rel=1e-6)
+    assert "200: 30" in out
+
+
+def test_a_sweep_that_is_interrupted_keeps_its_whole_steps(service, tmp_path):
+    end = threading.Event()
+    service.reply = held(end, 10)  # all of the first step
+    try:
+        status, out, err = interrupted(service, 11, "--sweep", "--rate", 50, "--duration", 0.2, "--json", tmp_path / "a.json")
+    finally:
+        end.set()
+    assert status == 130 and "1 whole steps" in err, err
+    steps = json.loads((tmp_path / "a.json").read_text())["steps"]
+    assert [step["report"]["good"]["count"] for step in steps] == [10] and "knee" in out
 
 
 # --- two runs --------------------------------------------------------------------------------------------------------------------------------

@@ -113,10 +113,20 @@ def test_format_follows_extension(server, tmp_path, name, format):
     assert server.seen[0].body == ({"output": {"format": format}} if format else {})
 
 
-def test_scene_keeps_its_format(server, tmp_path):
-    (tmp_path / "scene.json").write_text('{"output": {"format": "exr", "width": 64}}')
-    stratus(server, "render", tmp_path / "scene.json", "-o", tmp_path / "a.png")
-    assert server.seen[0].body == {"output": {"format": "exr", "width": 64}}
+@pytest.mark.parametrize("name, format", [("a.exr", "exr"), ("a.png", "png"), ("a.dat", "png"), ("-", "png")])
+def test_extension_decides_over_the_scene(server, tmp_path, name, format):
+    """A picture's scene names the format that it had: `info --scene a.png | render - -o again.exr` is an EXR all the same."""
+    scene = '{"output": {"format": "%s", "width": 64}}'
+    for said in ("png", "exr") if name.startswith("a.") and name != "a.dat" else ("png",):
+        assert stratus(server, "render", "-", "-o", name if name == "-" else tmp_path / name, input=(scene % said).encode()).returncode == 0
+    assert [seen.body for seen in server.seen] == [{"output": {"format": format, "width": 64}}] * len(server.seen)
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.JPEG", "a.tif", "a.webp", "a.gif", "a.hdr", "a.bmp", "a.mp4"])
+def test_no_other_type_under_a_wrong_name(server, tmp_path, name):
+    done = stratus(server, "render", "-o", tmp_path / name)
+    assert done.returncode == 2 and b".png and .exr" in done.stderr
+    assert not server.seen and os.listdir(tmp_path) == []
 
 
 def test_standard_input_and_output(server):

@@ -134,6 +134,19 @@ check("the address follows the scene", "", async (visit) => {
 	await visit.until(() => location.hash.includes("sun.elevation_deg=66"));
 });
 
+check("a low screen begins at the top, and the picture covers no controls", "", async (visit) => {
+	assert.equal(await visit.page.evaluate(() => scrollY), 0);
+	await visit.tab("share");
+	await visit.tab("sun");
+	const covered = await visit.page.evaluate(() => {
+		const dome = document.getElementById("dome");
+		dome.scrollIntoView({ block: "start" });
+		const { x, y, width } = dome.getBoundingClientRect();
+		return document.elementFromPoint(x + width / 2, Math.max(y, 0) + 30).closest("#stage") !== null;
+	});
+	assert.ok(!covered);
+}, { viewport: { width: 740, height: 360 } });
+
 check("the page works on a phone", "", async (visit) => {
 	const wide = await visit.page.evaluate(() => document.documentElement.scrollWidth);
 	assert.ok(wide <= 390, `nothing is wider than the screen: ${wide}`);

@@ -136,6 +136,14 @@ check("time goes on while it plays, and stops", "", async (visit) => {
 	assert.equal(await visit.page.getAttribute("#play", "aria-pressed"), "false");
 });
 
+check("the sun that plays goes over the night to the next dawn", "#sun.time=2026-06-21T20:30:00Z&sun.latitude_deg=45.19&sun.longitude_deg=5.72", async (visit) => {
+	await visit.page.selectOption("#play-what", "sun:5");
+	await visit.page.click("#play");
+	await visit.until(() => JSON.parse(document.getElementById("stage").dataset.scene).sun.time.startsWith("2026-06-22"));
+	await visit.page.click("#play");
+	await visit.rests();
+});
+
 async function download(visit, file) {
 	const waiting = visit.page.waitForEvent("download");
 	await visit.page.click(`[data-file=${file}]`);

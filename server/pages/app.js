@@ -54,6 +54,8 @@ const animation = new Animation(scene, document.querySelector(".play"), {
 });
 let tabs = null;
 let retry = 0;
+/** What the page itself found wrong, such as in its address: told until something is changed, whatever is drawn. */
+let told = null;
 
 /** What screen readers are told. */
 function say(text) {
@@ -67,7 +69,10 @@ function failed(error) {
 	const others = controls.mark(error.errors ?? []);
 	const seconds = [429, 503].includes(error.status) ? Math.max(error.retryAfter, 1) : 0;
 	const text = others.length ? others.map(({ pointer, detail }) => `${pointer}: ${detail}`).join("; ") : kindly(error, seconds);
-	stage.say({ title: error.title || "That did not work.", text });
+	const notice = { title: error.title || "That did not work.", text };
+	stage.say(notice);
+	if (error.status === 0 && error.title !== "No answer")
+		told = notice;
 	clearTimeout(retry);
 	if (seconds)
 		retry = setTimeout(() => loop.changed(), 1000 * seconds);
@@ -87,7 +92,7 @@ function kindly(error, seconds) {
 
 viewer.drawn = (drawn) => {
 	clearTimeout(retry);
-	stage.say(null);
+	stage.say(told);
 	controls.mark([]);
 	exposure.drawn(drawn.ev);
 	if (drawn.kind !== "full")
@@ -107,6 +112,7 @@ function chooseLayer(layer) {
 
 function choosePreset(members) {
 	animation.stop();
+	told = null;
 	scene.replace(members);
 }
 
@@ -127,7 +133,17 @@ function keepAddress() {
 	}, 250);
 }
 
+/** The scene that an address says behind its #. */
+function takeAddress() {
+	const { members, wrong } = fromQuery(location.hash.slice(1));
+	told = wrong.length ? { title: "Left out of the address:", text: wrong.join("; ") } : null;
+	scene.replace(members);
+	stage.say(told);
+}
+
 scene.addEventListener("change", ({ detail }) => {
+	if (detail.paths)
+		told = null;
 	showParts();
 	dome.follow();
 	share.follow();
@@ -140,7 +156,8 @@ $("compare").addEventListener("change", ({ target }) => {
 	comparison.choose(target.value, scene.members());
 	loop.changed({ afresh: true });
 });
-addEventListener("hashchange", () => location.hash !== written && scene.replace(fromQuery(location.hash.slice(1))));
+/* The link to the controls is no scene. */
+addEventListener("hashchange", () => (location.hash === "#controls" ? keepAddress() : location.hash !== written && takeAddress()));
 new ResizeObserver(() => {
 	if (stage.element.dataset.shows && sizes.output(scene, "full").width !== stage.canvases.picture.width)
 		loop.outgrown();
@@ -164,5 +181,5 @@ async function begin() {
 	$("device").title = ready.renderer ?? "";
 }
 
-scene.replace(fromQuery(location.hash.slice(1)));
+takeAddress();
 begin();

@@ -67,15 +67,22 @@ function failed(error) {
 	if (!(error instanceof Problem))
 		console.error(error);
 	const others = controls.mark(error.errors ?? []);
-	const seconds = [429, 503].includes(error.status) ? Math.max(error.retryAfter, 1) : 0;
+	const seconds = secondsToRetry(error);
 	const text = others.length ? others.map(({ pointer, detail }) => `${pointer}: ${detail}`).join("; ") : kindly(error, seconds);
 	const notice = { title: error.title || "That did not work.", text };
 	stage.say(notice);
-	if (error.status === 0 && error.title !== "No answer")
+	if (error.status === 0 && !seconds)
 		told = notice;
 	clearTimeout(retry);
 	if (seconds)
 		retry = setTimeout(() => loop.changed(), 1000 * seconds);
+}
+
+/** 0: asking again is of no use. No status: there was no answer. */
+function secondsToRetry({ status, retryAfter = 0 }) {
+	if ([429, 503].includes(status))
+		return Math.max(retryAfter, 1);
+	return status === 0 ? retryAfter : 0;
 }
 
 function labelOf(pointer) {

@@ -160,7 +160,7 @@ scene.addEventListener("change", ({ detail }) => {
 });
 
 $("compare").addEventListener("change", ({ target }) => {
-	comparison.choose(target.value, scene.members());
+	comparison.choose(target.value, scene);
 	loop.changed({ afresh: true });
 });
 /* The link to the controls is no scene. */

@@ -82,6 +82,21 @@ check("two pictures are compared", "", async (visit) => {
 	assert.ok(difference(await visit.pixels("#picture"), await visit.pixels("#other")) > 3, "the kept scene stays as it was");
 });
 
+check("a kept scene of another projection keeps its shape", "#camera.projection=fisheye", async (visit) => {
+	const shapes = () => visit.page.$$eval("#picture, #other", (panes) => panes.map(({ width, height }) => Number((width / height).toFixed(1))));
+	await visit.page.selectOption("#compare", "kept");
+	await visit.tab("camera");
+	await visit.page.selectOption("#field-camera-projection", "perspective");
+	await visit.rests();
+	assert.deepEqual(await shapes(), [1.6, 1]);
+	assert.equal(await visit.page.locator("#tabs .bad").count(), 0);
+	await visit.page.selectOption("#compare", "");
+	await visit.page.selectOption("#compare", "kept");
+	await visit.page.selectOption("#field-camera-projection", "fisheye");
+	await visit.rests({ "camera.projection": "fisheye" });
+	assert.deepEqual(await shapes(), [1, 1.6]);
+});
+
 check("layers are shown, all small and one large", "", async (visit) => {
 	await visit.tab("layers");
 	await visit.until(() => [...document.querySelectorAll("#layers canvas")].every(({ width }) => width === 176));

@@ -54,6 +54,8 @@ const animation = new Animation(scene, document.querySelector(".play"), {
 });
 let tabs = null;
 let retry = 0;
+/** What the page itself found wrong, such as in its address: told until something is changed, whatever is drawn. */
+let told = null;
 
 /** What screen readers are told. */
 function say(text) {
@@ -65,12 +67,22 @@ function failed(error) {
 	if (!(error instanceof Problem))
 		console.error(error);
 	const others = controls.mark(error.errors ?? []);
-	const seconds = [429, 503].includes(error.status) ? Math.max(error.retryAfter, 1) : 0;
+	const seconds = secondsToRetry(error);
 	const text = others.length ? others.map(({ pointer, detail }) => `${pointer}: ${detail}`).join("; ") : kindly(error, seconds);
-	stage.say({ title: error.title || "That did not work.", text });
+	const notice = { title: error.title || "That did not work.", text };
+	stage.say(notice);
+	if (error.status === 0 && !seconds)
+		told = notice;
 	clearTimeout(retry);
 	if (seconds)
 		retry = setTimeout(() => loop.changed(), 1000 * seconds);
+}
+
+/** 0: asking again is of no use. No status: there was no answer. */
+function secondsToRetry({ status, retryAfter = 0 }) {
+	if ([429, 503].includes(status))
+		return Math.max(retryAfter, 1);
+	return status === 0 ? retryAfter : 0;
 }
 
 function labelOf(pointer) {
@@ -87,7 +99,7 @@ function kindly(error, seconds) {
 
 viewer.drawn = (drawn) => {
 	clearTimeout(retry);
-	stage.say(null);
+	stage.say(told);
 	controls.mark([]);
 	exposure.drawn(drawn.ev);
 	if (drawn.kind !== "full")
@@ -107,6 +119,7 @@ function chooseLayer(layer) {
 
 function choosePreset(members) {
 	animation.stop();
+	told = null;
 	scene.replace(members);
 }
 
@@ -127,7 +140,17 @@ function keepAddress() {
 	}, 250);
 }
 
+/** The scene that an address says behind its #. */
+function takeAddress() {
+	const { members, wrong } = fromQuery(location.hash.slice(1));
+	told = wrong.length ? { title: "Left out of the address:", text: wrong.join("; ") } : null;
+	scene.replace(members);
+	stage.say(told);
+}
+
 scene.addEventListener("change", ({ detail }) => {
+	if (detail.paths)
+		told = null;
 	showParts();
 	dome.follow();
 	share.follow();
@@ -137,10 +160,11 @@ scene.addEventListener("change", ({ detail }) => {
 });
 
 $("compare").addEventListener("change", ({ target }) => {
-	comparison.choose(target.value, scene.members());
+	comparison.choose(target.value, scene);
 	loop.changed({ afresh: true });
 });
-addEventListener("hashchange", () => location.hash !== written && scene.replace(fromQuery(location.hash.slice(1))));
+/* The link to the controls is no scene. */
+addEventListener("hashchange", () => (location.hash === "#controls" ? keepAddress() : location.hash !== written && takeAddress()));
 new ResizeObserver(() => {
 	if (stage.element.dataset.shows && sizes.output(scene, "full").width !== stage.canvases.picture.width)
 		loop.outgrown();
@@ -164,5 +188,5 @@ async function begin() {
 	$("device").title = ready.renderer ?? "";
 }
 
-scene.replace(fromQuery(location.hash.slice(1)));
+takeAddress();
 begin();

@@ -129,10 +129,35 @@ check("a shared address restores the scene", "#sun.elevation_deg=12.5&sun.azimut
 	assert.match(answer.headers.get("content-location"), /sun\.elevation_deg=12\.5/);
 });
 
+check("what is wrong in an address is told and left out", "#output.exposure_ev=foo&constructor.prototype=1&sun.elevation_deg=abc&camera.position_m=1&dsd.gamma=0&sun.time=noon&ground.type=snow", async (visit) => {
+	await visit.rests({ "ground.type": "snow" });
+	const notice = await visit.page.textContent("#notice");
+	for (const path of ["output.exposure_ev", "constructor.prototype", "sun.elevation_deg", "camera.position_m", "dsd.gamma", "sun.time"])
+		assert.ok(notice.includes(`${path} is no`), `${path} in: ${notice}`);
+	assert.ok(await visit.page.isVisible("#notice"));
+	assert.deepEqual(Object.keys(JSON.parse(await visit.page.getAttribute("#stage", "data-scene"))), ["ground"]);
+	await visit.enter("sun.elevation_deg", 30);
+	await visit.rests({ "sun.elevation_deg": 30 });
+	assert.ok(await visit.page.isHidden("#notice"), "told until something is changed");
+});
+
 check("the address follows the scene", "", async (visit) => {
 	await visit.enter("sun.elevation_deg", 66);
 	await visit.until(() => location.hash.includes("sun.elevation_deg=66"));
 });
+
+check("a low screen begins at the top, and the picture covers no controls", "", async (visit) => {
+	assert.equal(await visit.page.evaluate(() => scrollY), 0);
+	await visit.tab("share");
+	await visit.tab("sun");
+	const covered = await visit.page.evaluate(() => {
+		const dome = document.getElementById("dome");
+		dome.scrollIntoView({ block: "start" });
+		const { x, y, width } = dome.getBoundingClientRect();
+		return document.elementFromPoint(x + width / 2, Math.max(y, 0) + 30).closest("#stage") !== null;
+	});
+	assert.ok(!covered);
+}, { viewport: { width: 740, height: 360 } });
 
 check("the page works on a phone", "", async (visit) => {
 	const wide = await visit.page.evaluate(() => document.documentElement.scrollWidth);

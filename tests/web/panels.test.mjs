@@ -82,6 +82,21 @@ check("two pictures are compared", "", async (visit) => {
 	assert.ok(difference(await visit.pixels("#picture"), await visit.pixels("#other")) > 3, "the kept scene stays as it was");
 });
 
+check("a kept scene of another projection keeps its shape", "#camera.projection=fisheye", async (visit) => {
+	const shapes = () => visit.page.$$eval("#picture, #other", (panes) => panes.map(({ width, height }) => Number((width / height).toFixed(1))));
+	await visit.page.selectOption("#compare", "kept");
+	await visit.tab("camera");
+	await visit.page.selectOption("#field-camera-projection", "perspective");
+	await visit.rests();
+	assert.deepEqual(await shapes(), [1.6, 1]);
+	assert.equal(await visit.page.locator("#tabs .bad").count(), 0);
+	await visit.page.selectOption("#compare", "");
+	await visit.page.selectOption("#compare", "kept");
+	await visit.page.selectOption("#field-camera-projection", "fisheye");
+	await visit.rests({ "camera.projection": "fisheye" });
+	assert.deepEqual(await shapes(), [1, 1.6]);
+});
+
 check("layers are shown, all small and one large", "", async (visit) => {
 	await visit.tab("layers");
 	await visit.until(() => [...document.querySelectorAll("#layers canvas")].every(({ width }) => width === 176));
@@ -134,6 +149,14 @@ check("time goes on while it plays, and stops", "", async (visit) => {
 	const time = Number(await visit.page.inputValue("#field-clouds-time-s"));
 	assert.ok(time >= 30 && time % 10 === 0);
 	assert.equal(await visit.page.getAttribute("#play", "aria-pressed"), "false");
+});
+
+check("the sun that plays goes over the night to the next dawn", "#sun.time=2026-06-21T20:30:00Z&sun.latitude_deg=45.19&sun.longitude_deg=5.72", async (visit) => {
+	await visit.page.selectOption("#play-what", "sun:5");
+	await visit.page.click("#play");
+	await visit.until(() => JSON.parse(document.getElementById("stage").dataset.scene).sun.time.startsWith("2026-06-22"));
+	await visit.page.click("#play");
+	await visit.rests();
 });
 
 async function download(visit, file) {

@@ -1,5 +1,5 @@
 /** Frames one after the other, each asked for when the one before it is there: clouds that drift, or the sun over a day. */
-import { later } from "./sun_place.js";
+import { nextSun } from "./night.js";
 
 const SHORTEST_MS = 60;
 
@@ -24,12 +24,23 @@ export class Animation {
 		return this.#playing !== null;
 	}
 
-	#step() {
+	async #step(signal) {
 		const [what, by] = this.what.value.split(":");
 		if (what === "sun")
-			this.scene.set({ "sun.time": later(this.scene.value("sun.time"), Number(by)) }, { moving: true });
+			await this.#moveSun(Number(by), signal);
 		else
 			this.scene.set({ "clouds.time_s": (this.scene.value("clouds.time_s") + Number(by)) % 1e7 }, { moving: true });
+	}
+
+	async #moveSun(minutes, signal) {
+		if (!this.scene.isByPlace)
+			return this.stop();
+		const from = this.scene.value("sun.time");
+		const time = await nextSun(this.scene, minutes, signal);
+		signal.throwIfAborted();
+		/* Whoever has set another time, or the sun by hand, meanwhile has the word. */
+		if (this.scene.value("sun.time") === from)
+			this.scene.set({ "sun.time": time }, { moving: true });
 	}
 
 	async play() {
@@ -41,7 +52,7 @@ export class Animation {
 		try {
 			while (!signal.aborted) {
 				const began = performance.now();
-				this.#step();
+				await this.#step(signal);
 				await this.stage.draw(signal);
 				await new Promise((done) => setTimeout(done, Math.max(SHORTEST_MS - (performance.now() - began), 0)));
 			}

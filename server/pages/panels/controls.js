@@ -78,9 +78,15 @@ export class Controls {
 		const { toValue, toSlider } = sliderOf(field);
 		slider.addEventListener("input", () => this.scene.set({ [field.path]: toValue(Number(slider.value)) }, { moving: true }));
 		slider.addEventListener("keydown", (event) => stepByKey(event, slider));
-		number.addEventListener("change", () => number.value !== "" && this.scene.set({ [field.path]: Number(number.value) }));
+		const rounded = (value) => Number(value.toPrecision(7));
+		number.addEventListener("change", () => {
+			if (number.value === "")
+				number.value = String(rounded(this.scene.value(field.path)));
+			else
+				this.scene.set({ [field.path]: Number(number.value) });
+		});
 		const show = (value) => {
-			const shown = Number(value.toPrecision(7));
+			const shown = rounded(value);
 			slider.value = String(toSlider(value));
 			slider.setAttribute("aria-valuetext", `${shown} ${field.unit ?? ""}`.trim());
 			if (document.activeElement !== number || Number(number.value) !== value)

@@ -28,8 +28,11 @@ export class Droplets {
 
 	follow() {
 		const dsd = { n0: this.scene.value("dsd.n0_per_cm3"), gamma: this.scene.value("dsd.gamma"), effective: this.scene.value("dsd.effective_radius_um") };
-		drawSizes(this.figures.sizes, dsd);
-		this.#tell({ "Liquid water": `${digits(liquidWater(dsd))} g/m³` });
+		/* Else there is no such distribution, which the service will say. */
+		if (Object.values(dsd).every((value) => value > 0)) {
+			drawSizes(this.figures.sizes, dsd);
+			this.#tell({ "Liquid water": `${digits(liquidWater(dsd))} g/m³` });
+		}
 		const { dsd: members, model } = this.scene.members();
 		this.optics.want(toQuery({ ...(members && { dsd: members }), ...(model?.optics && { model: { optics: model.optics } }) }));
 	}

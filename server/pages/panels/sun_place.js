@@ -1,4 +1,5 @@
 /** The sun by date, time and place: /v1/sun says where it stands, now and over the day. */
+import { FIELDS } from "../scene/fields.js";
 import { fetchJson } from "../service/api.js";
 import { latest } from "../service/latest.js";
 
@@ -94,7 +95,13 @@ export class SunPlace {
 		if (by === "place")
 			this.begin();
 		else
-			this.scene.set({ "sun.time": undefined, "sun.elevation_deg": this.dome.sun.elevation, "sun.azimuth_deg": this.dome.sun.azimuth });
+			this.#takeOver();
+	}
+
+	/** The sun by hand from where it stands, or at night from as deep as scenes have it. */
+	#takeOver() {
+		const { elevation, azimuth } = this.dome.sun;
+		this.scene.set({ "sun.time": undefined, "sun.elevation_deg": Math.max(elevation, FIELDS.get("sun.elevation_deg").min), "sun.azimuth_deg": azimuth });
 	}
 
 	follow() {

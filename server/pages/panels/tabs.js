@@ -2,10 +2,11 @@
 export class Tabs {
 	/** @param {HTMLElement} list  @param {(name: string) => void} chosen */
 	constructor(list, chosen) {
+		this.list = list;
 		this.tabs = [...list.querySelectorAll("[role=tab]")];
 		this.chosen = chosen;
 		for (const tab of this.tabs) {
-			tab.addEventListener("click", () => this.choose(tab));
+			tab.addEventListener("click", () => this.#take(tab));
 			tab.addEventListener("keydown", (event) => this.#key(event, tab));
 		}
 		this.choose(this.tabs[0]);
@@ -22,8 +23,19 @@ export class Tabs {
 			other.tabIndex = is ? 0 : -1;
 			document.getElementById(other.getAttribute("aria-controls")).hidden = !is;
 		}
-		tab.scrollIntoView({ block: "nearest", inline: "nearest" });
 		this.chosen(tab.dataset.tab);
+	}
+
+	/** Along the list alone: the page stays where it is. */
+	#reveal(tab) {
+		const list = this.list.getBoundingClientRect();
+		const box = tab.getBoundingClientRect();
+		this.list.scrollLeft += Math.min(box.left - list.left, 0) + Math.max(box.right - list.right, 0);
+	}
+
+	#take(tab) {
+		this.choose(tab);
+		this.#reveal(tab);
 	}
 
 	#key(event, tab) {
@@ -33,7 +45,7 @@ export class Tabs {
 			return;
 		event.preventDefault();
 		const next = this.tabs[(to + this.tabs.length) % this.tabs.length];
-		this.choose(next);
+		this.#take(next);
 		next.focus();
 	}
 }

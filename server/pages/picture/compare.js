@@ -17,13 +17,20 @@ const VARIANTS = {
 	},
 };
 
-/** Without sections that say nothing. */
+/** Without what says nothing. */
 const tidy = (members) => Object.fromEntries(Object.entries(members).filter(([, inner]) => inner !== undefined));
 
-export class Comparison {
-	/** @type {object | null} members of the scene that was kept */
-	#kept = null;
+/** The scene as it is now, for later: of the size of the picture beside it, or, where its shape is another, of its own. */
+function keep(scene, sizes) {
+	const { shape, isPanorama } = scene;
+	const members = scene.members();
+	return (now, kind) => {
+		const alike = scene.shape === shape && scene.isPanorama === isPanorama;
+		return { ...members, output: alike ? now.output : tidy({ ...now.output, ...sizes.output({ shape, isPanorama }, kind) }) };
+	};
+}
 
+export class Comparison {
 	/**
 	 * @param {import("./stage.js").Stage} stage
 	 * @param {import("./viewer.js").Viewer} viewer
@@ -38,14 +45,13 @@ export class Comparison {
 		divider.addEventListener("keydown", (event) => this.#key(event));
 	}
 
-	/** @param {string} name a variant, "kept" for the scene that was kept, or "" for none  @param {object} members the scene */
-	choose(name, members) {
-		this.#kept = name === "kept" ? { ...members, output: undefined } : null;
+	/** @param {string} name a variant, "kept" for the scene that was kept, or "" for none  @param {import("../scene/scene.js").Scene} scene */
+	choose(name, scene) {
 		const variant = VARIANTS[name];
 		if (!name)
 			this.viewer.other = null;
 		else
-			this.viewer.other = (now) => tidy(variant ? variant.change(now) : { ...this.#kept, output: now.output });
+			this.viewer.other = variant ? (now) => tidy(variant.change(now)) : keep(scene, this.viewer.sizes);
 		this.stage.compare(name ? (variant?.names ?? ["Now", "Kept"]) : null);
 	}
 

@@ -33,7 +33,7 @@ export class Viewer {
 		this.stage = stage;
 		this.sizes = sizes;
 		this.layer = "color";
-		/** @type {((members: object) => object) | null} what stands beside the picture, for comparing */
+		/** @type {((members: object, kind: "quick" | "full") => object) | null} what stands beside the picture, for comparing */
 		this.other = null;
 		/** @type {(drawn: {kind: string, width: number, height: number, took: number, shown: number, bytes: number, ev: number, timing: object[]}) => void} */
 		this.drawn = () => {};
@@ -50,7 +50,7 @@ export class Viewer {
 			const more = this.layer === "color" ? {} : { ...LIGHT, layers: [this.layer] };
 			const members = this.#ask(kind, more);
 			const drawn = await this.#drawPane("picture", members, kind, signal);
-			const other = this.other?.(members);
+			const other = this.other?.(members, kind);
 			if (other && !(kind === "quick" && takesLong(other)))
 				await this.#drawPane("other", other, kind, signal);
 			this.drawn({ kind, ...drawn });

@@ -2,6 +2,8 @@
 import { readTiming } from "./timing.js";
 
 const KEY = "stratus-key";
+/** A daemon that is started again is there after some seconds. */
+const LOST_S = 5;
 
 /** An answer that is none: a problem (RFC 9457), or that there was no answer. */
 export class Problem extends Error {
@@ -40,7 +42,7 @@ export async function call(call, { signal, priority, cache } = {}) {
 	const response = await fetch(address(call), { headers, signal, priority, cache }).catch((error) => {
 		if (error.name === "AbortError")
 			throw error;
-		throw new Problem({ title: "No answer", detail: "The service does not answer. Is it still running?" });
+		throw new Problem({ title: "No answer", detail: "The service does not answer. Is it still running?", retry_after_seconds: LOST_S });
 	});
 	if (response.ok)
 		return response;

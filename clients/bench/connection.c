@@ -307,6 +307,11 @@ static enum connection_event send_request(struct connection *connection)
 	return CONNECTION_GOES_ON;
 }
 
+enum connection_event connection_ask(struct connection *connection)
+{
+	return connection->state == CONNECTION_SENDING ? send_request(connection) : CONNECTION_GOES_ON;
+}
+
 enum connection_event connection_advance(struct connection *connection)
 {
 	enum connection_event event = CONNECTION_GOES_ON;

@@ -51,6 +51,10 @@ struct connection {
 /* Starts with a request, which is taken over; a closed connection is opened first. CONNECTION_GOES_ON or CONNECTION_REFUSED. */
 enum connection_event connection_start(struct connection *connection, const struct addrinfo *address, struct mix_request *request);
 
+/* Sends what can be sent at once of a request that was just started. There cannot be an answer yet, and so none is looked for: epoll's edge
+ * will tell of it. CONNECTION_GOES_ON. */
+enum connection_event connection_ask(struct connection *connection);
+
 /* Does all that can be done at once, so that the next change of the socket (epoll's edge) is worth a call. After CONNECTION_ANSWERED the
  * connection is idle, or closed when the server wished so; after CONNECTION_GOES_ON more is to come; else it is closed. */
 enum connection_event connection_advance(struct connection *connection);

@@ -168,7 +168,7 @@ static enum connection_event begin(struct load *load, int index, struct mix_requ
 {
 	struct connection *connection = &load->connection[index];
 	const bool fresh = connection->state == CONNECTION_CLOSED;
-	enum connection_event event = connection_start(connection, load->address.found, request);
+	const enum connection_event event = connection_start(connection, load->address.found, request);
 	if (event == CONNECTION_GOES_ON && fresh) {
 		struct epoll_event interest = {.events = EPOLLIN | EPOLLOUT | EPOLLRDHUP | EPOLLET, .data.u32 = (uint32_t)index};
 		if (epoll_ctl(load->epoll, EPOLL_CTL_ADD, connection->fd, &interest) != 0) {
@@ -176,7 +176,7 @@ static enum connection_event begin(struct load *load, int index, struct mix_requ
 			return CONNECTION_REFUSED;
 		}
 	}
-	return event == CONNECTION_GOES_ON ? connection_advance(connection) : event;
+	return event == CONNECTION_GOES_ON ? connection_ask(connection) : event;
 }
 
 /* Goes on with a connection after something happened to it. */
@@ -218,21 +218,28 @@ static void start_request(struct load *load, int64_t planned_ns)
 	settle(load, index, begin(load, index, &request));
 }
 
+static void drop_idle(struct load *load, int index)
+{
+	for (int i = 0; i < load->idle_count; i++)
+		if (load->idle[i] == index) {
+			load->idle[i] = load->idle[--load->idle_count];
+			load->closed[load->closed_count++] = index;
+			break;
+		}
+	connection_close(&load->connection[index]);
+}
+
+/* The end of a connection may come with the last answer on it. */
 static void take_event(struct load *load, const struct epoll_event *event)
 {
 	const int index = (int)event->data.u32;
 	struct connection *connection = &load->connection[index];
-	if (connection->state == CONNECTION_IDLE && connection_is_dead(connection)) {
-		for (int i = 0; i < load->idle_count; i++)
-			if (load->idle[i] == index) {
-				load->idle[i] = load->idle[--load->idle_count];
-				load->closed[load->closed_count++] = index;
-				break;
-			}
-		connection_close(connection);
-	} else if (connection->state != CONNECTION_IDLE && connection->state != CONNECTION_CLOSED) {
+	const bool busy = connection->state != CONNECTION_IDLE && connection->state != CONNECTION_CLOSED;
+	if (busy)
 		settle(load, index, connection_advance(connection));
-	}
+	const bool ends = event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR);
+	if (connection->state == CONNECTION_IDLE && (!busy || ends) && connection_is_dead(connection))
+		drop_idle(load, index);
 }
 
 /* Gives up what has waited too long. */

@@ -61,6 +61,8 @@ class Server:
                     return
                 if b"Connection: close" in data:
                     return
+                if b"Last-Words" in data:
+                    client.shutdown(socket.SHUT_WR)  # and hears on, so that nothing but the end of its bytes tells
 
     def close(self):
         self.listener.close()
@@ -208,6 +210,12 @@ def test_a_resting_connection_that_was_closed_is_no_error(serve):
     # Every second request meets a closed connection and is asked again on a new one.
     found = figures(server.url, "--connections", "1", "--duration", "0.5", "--warm-up", "0")
     assert found["errors"] == 0 and found["good"]["count"] > 5
+
+
+def test_the_end_of_a_connection_may_come_with_an_answer(serve):
+    server = serve(lambda *_: plain(headers="Last-Words: 1\r\n"))
+    found = figures(server.url, "--connections", "1", "--duration", "0.5", "--warm-up", "0", "--timeout", "20")
+    assert found["errors"] == 0 and found["good"]["count"] > 5 and found["good"]["max_s"] < 10
 
 
 def test_stages_of_the_daemon_are_told(serve):

@@ -1,10 +1,11 @@
 """What the load generator costs itself: stratus bench beside wrk and hey, on pages that the daemon has ready (a daemon at STRATUS_SERVER).
 
-    agreement.py BUILD_DIR [ROUNDS [SECONDS]]
+    agreement.py BUILD_DIR [ROUNDS [SECONDS [CONNECTIONS [PID]]]]
 
 All ask by as many connections from one thread (hey has as many as it likes), one after the other in every round, in an order that turns, so that what
 else the machine does falls on all alike. Told is the median over the rounds of the ratio of rates within a round, and its interval of 95 % by resampling;
-and what a request cost each of them of a processor.
+and what a request cost each of them of a processor. With the daemon's process number, it is held to one processor and who asks to another, so that none
+of them is measured by how the kernel happens to place the two.
 """
 import json
 import os
@@ -16,7 +17,6 @@ import subprocess
 import sys
 
 URL = os.environ.get("STRATUS_SERVER", "http://127.0.0.1:8080")
-CONNECTIONS = 4
 PAGES = ("/healthz", "/openapi.yaml")
 
 
@@ -31,21 +31,29 @@ def output(*command):
 
 
 def run(*command):
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True).stdout
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True, preexec_fn=hold).stdout
 
 
-def by_stratus(build, page, seconds):
-    return json.loads(output(f"{build}/stratus", "bench", "--server", URL, "--get", page, "--connections", CONNECTIONS, "--duration", seconds, "--warm-up", 0.2, "-q", "--json", "-"))["good_per_s"]
+def hold():
+    """Keeps who asks off the daemon's processor."""
+    if pid:
+        os.sched_setaffinity(0, {1})
 
 
-def by_wrk(_, page, seconds):
-    return float(re.search(r"Requests/sec:\s*([\d.]+)", output("wrk", "-t1", f"-c{CONNECTIONS}", f"-d{seconds}s", URL + page))[1])
+def by_stratus(page):
+    return json.loads(output(f"{build}/stratus", "bench", "--server", URL, "--get", page, "--connections", connections, "--duration", seconds, "--warm-up", 0.2, "-q", "--json", "-"))["good_per_s"]
 
 
-def by_hey(_, page, seconds):
-    return float(re.search(r"Requests/sec:\s*([\d.]+)", output("hey", "-c", CONNECTIONS, "-z", f"{seconds}s", "-disable-compression", URL + page))[1])
+def by_wrk(page):
+    return float(re.search(r"Requests/sec:\s*([\d.]+)", output("wrk", "-t1", f"-c{connections}", f"-d{seconds}s", URL + page))[1])
 
 
+def by_hey(page):
+    return float(re.search(r"Requests/sec:\s*([\d.]+)", output("hey", "-c", connections, "-z", f"{seconds}s", "-disable-compression", URL + page))[1])
+
+
+build, rounds, seconds, connections, pid = (sys.argv[1:] + [None] * 5)[:5]
+rounds, seconds, connections = int(rounds or 12), int(seconds or 2), int(connections or 4)
 spent = []  # s of a processor, by commands
 TOOLS = {"stratus bench": by_stratus, "wrk": by_wrk, "hey": by_hey}
 
@@ -57,15 +65,17 @@ def interval(values):
 
 
 def main():
-    build, rounds, seconds = sys.argv[1], int((sys.argv[2:] or [12])[0]), int((sys.argv[3:] or [2])[0])
+    if pid:
+        for thread in os.listdir(f"/proc/{pid}/task"):
+            os.sched_setaffinity(int(thread), {0})
     for page in PAGES:
         rates, costs = {name: [] for name in TOOLS}, {name: [] for name in TOOLS}
         for number in range(rounds):
             names = list(TOOLS)
             for name in names[number % 3 :] + names[: number % 3]:
-                rates[name].append(TOOLS[name](build, page, seconds))
+                rates[name].append(TOOLS[name](page))
                 costs[name].append(1e6 * spent[-1] / (rates[name][-1] * seconds))
-        print(f"{page}, {rounds} rounds of {seconds} s, {CONNECTIONS} connections")
+        print(f"{page}, {rounds} rounds of {seconds} s, {connections} connections" + (", a processor each" if pid else ""))
         for name in TOOLS:
             ratios = [ours / theirs for ours, theirs in zip(rates["stratus bench"], rates[name])]
             low, high = interval(ratios)

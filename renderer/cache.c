@@ -18,6 +18,7 @@ struct entry {
 struct cache {
 	struct entry *first;
 	size_t bound, bytes;
+	size_t owner_bound[CACHE_OWNERS];
 	unsigned long frame;
 	int owner;
 	_Atomic size_t owned[CACHE_OWNERS];
@@ -50,6 +51,8 @@ void cache_key_add(struct cache_key *key, double number)
 struct cache *cache_create(size_t bound)
 {
 	struct cache *cache = calloc(1, sizeof *cache);
+	for (int i = 0; cache && i < CACHE_OWNERS; i++)
+		cache->owner_bound[i] = bound;
 	if (cache)
 		cache->bound = bound;
 	return cache;
@@ -89,9 +92,21 @@ static struct entry **next_to_drop(struct cache *cache)
 	return oldest;
 }
 
+static struct entry **oldest_of(struct cache *cache, int owner)
+{
+	struct entry **oldest = NULL;
+	for (struct entry **link = &cache->first; *link; link = &(*link)->next)
+		if ((*link)->owner == owner && (*link)->frame != cache->frame)
+			oldest = link;
+	return oldest;
+}
+
 static void shrink(struct cache *cache)
 {
 	struct entry **link;
+	for (int i = 0; i < CACHE_OWNERS; i++)
+		while (cache->owned[i] > cache->owner_bound[i] && (link = oldest_of(cache, i)))
+			drop(cache, link);
 	while (cache->bytes > cache->bound && (link = next_to_drop(cache)))
 		drop(cache, link);
 }
@@ -146,6 +161,11 @@ size_t cache_bytes(const struct cache *cache)
 void cache_set_owner(struct cache *cache, int owner)
 {
 	cache->owner = owner;
+}
+
+void cache_bound_owner(struct cache *cache, int owner, size_t bytes)
+{
+	cache->owner_bound[owner] = bytes;
 }
 
 size_t cache_owned_bytes(const struct cache *cache, int owner)

@@ -40,6 +40,9 @@ size_t cache_bytes(const struct cache *cache);
 
 /* Results kept from here on are counted for `owner`, 0 <= owner < CACHE_OWNERS; 0 at first. */
 void cache_set_owner(struct cache *cache, int owner);
+/* Of this owner's results no more than so many bytes are kept, beyond those of the frame in work; at first as many as the cache has room
+ * for. */
+void cache_bound_owner(struct cache *cache, int owner, size_t bytes);
 /* Bytes of an owner's results. Any thread. */
 size_t cache_owned_bytes(const struct cache *cache, int owner);
 

@@ -26,7 +26,8 @@ double exposure_ev(const struct scene *scene, const struct scene_light *light)
 	if (!scene->output.exposure_auto)
 		return scene->output.exposure_ev;
 	const bool above = scene_has_clouds(scene) && scene->camera.position_m[2] >= scene->clouds.base_m;
-	const double lux = fmax(0.65 * light->diffuse + 0.21 * light->direct + (0.08 + low_sun_share(scene->sun.elevation_deg, light)) * light->beam, 1e-2);
+	const double lux = fmax(
+		0.65 * light->diffuse + 0.21 * light->direct + (0.08 + low_sun_share(scene->sun.elevation_deg, light)) * light->beam, 1e-2);
 	return log2(0.6 * M_PI * COLOUR_WHITE_LUMINANCE / lux) + 0.18 * log2(lux / 40000) +
 	       (above ? exposure_above_ev * light->direct / (light->direct + light->diffuse + 1e-9) : 0);
 }

@@ -177,6 +177,16 @@ static bool run_reference(struct frame_job *job, const struct view_inputs *view)
 	return true;
 }
 
+/* Of the output's size and codes, unless it is so already. */
+static bool make_developed(struct texture *developed, const struct scene_output *output)
+{
+	const enum texture_format format = output->bits == 16 ? TEXTURE_RGBA16 : TEXTURE_RGBA8;
+	if (developed->id && developed->width == output->width && developed->height == output->height && developed->format == format)
+		return true;
+	texture_finish(developed);
+	return texture_init(developed, output->width, output->height, format, TEXTURE_NEAREST);
+}
+
 static bool run_view(struct frame_job *job)
 {
 	struct renderer *renderer = job->renderer;
@@ -213,10 +223,9 @@ static bool run_view(struct frame_job *job)
 		return false;
 	if (output->format != IMAGE_PNG)
 		return true;
-	if (!texture_init(&job->developed, output->width, output->height, output->bits == 16 ? TEXTURE_RGBA16 : TEXTURE_RGBA8,
-			  TEXTURE_NEAREST))
+	if (!make_developed(&renderer->developed, output))
 		return false;
-	view_develop(&renderer->view, job->pictures[0], job->scene->camera.projection == PROJECTION_FISHEYE, &job->developed);
+	view_develop(&renderer->view, job->pictures[0], job->scene->camera.projection == PROJECTION_FISHEYE, &renderer->developed);
 	return true;
 }
 
@@ -224,7 +233,7 @@ static bool run_readback(struct frame_job *job)
 {
 	struct frame *frame = job->frame;
 	const struct scene_output *output = &job->scene->output;
-	const struct texture *developed = &job->developed;
+	const struct texture *developed = &job->renderer->developed;
 	frame->width = output->width;
 	frame->height = output->height;
 	frame->channels = 3;

@@ -28,10 +28,10 @@ struct frame_job {
 	struct radiosity_light light;
 	bool clouds;
 	const struct texture *pictures[LAYER_COUNT];
-	struct texture developed;
 };
 
-/* Runs one stage; those before it have been. false: the stage could not do its work, or was stopped (job->unfinished: it goes on in another call). */
+/* Runs one stage; those before it have been. false: the stage could not do its work, or was stopped (job->unfinished: it goes on in another
+ * call). */
 bool frame_job_run(struct frame_job *job, enum stage stage);
 
 #endif

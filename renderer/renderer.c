@@ -112,6 +112,9 @@ struct renderer *renderer_create(const struct renderer_params *params)
 	renderer->context.cache = cache_create(params->cache_bytes ? params->cache_bytes : DEFAULT_CACHE_BYTES);
 	if (!renderer->context.cache)
 		goto fail;
+	/* Pictures are large and seldom asked for twice; memory of one that was dropped is cheaper for the next than fresh memory, which
+	 * software renderers clear. */
+	cache_bound_owner(renderer->context.cache, STAGE_VIEW, (params->cache_bytes ? params->cache_bytes : DEFAULT_CACHE_BYTES) / 4);
 	glCreateBuffers(1, &renderer->context.block_buffer);
 	glNamedBufferStorage(renderer->context.block_buffer, sizeof renderer->context.block, NULL, GL_DYNAMIC_STORAGE_BIT);
 	if (!start_stages(renderer, params)) {
@@ -133,6 +136,7 @@ void renderer_destroy(struct renderer *renderer)
 		for (int i = 0; i < STAGE_COUNT; i++)
 			gl_timer_finish(&renderer->timers[i]);
 		transfers_finish(&renderer->transfers);
+		texture_finish(&renderer->developed);
 		cache_destroy(renderer->context.cache); /* first: what it drops may go back to a stage */
 		finish_stages(renderer);
 		if (renderer->context.block_buffer)
@@ -315,7 +319,6 @@ enum render_result renderer_start(struct renderer *renderer, const struct scene 
 	frame->radiosity_passes = job.light.passes;
 	frame->radiosity_residual = job.light.residual;
 	memcpy(frame->radiosity_residuals, job.light.residuals, sizeof frame->radiosity_residuals);
-	texture_finish(&job.developed);
 	droplets_release(&renderer->context);
 	if (result != RENDER_OK) {
 		if (result == RENDER_OUT_OF_MEMORY)

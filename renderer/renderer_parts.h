@@ -27,6 +27,7 @@ struct renderer {
 	struct sea_stage sea;
 	struct gl_timer timers[STAGE_COUNT];
 	struct frame_transfers transfers;
+	struct texture developed; /* of the last picture that is codes; its memory serves the next one */
 };
 
 #endif

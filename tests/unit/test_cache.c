@@ -77,6 +77,30 @@ static void bytes_are_counted_for_their_owner(void **state)
 	cache_destroy(cache);
 }
 
+static void an_owner_may_have_a_bound_of_its_own(void **state)
+{
+	(void)state;
+	struct cache *cache = cache_create(1000);
+	cache_bound_owner(cache, 3, 250);
+	cache_begin_frame(cache);
+	keep(cache, 1, 100);
+	cache_set_owner(cache, 3);
+	for (int i = 2; i < 6; i++) {
+		cache_begin_frame(cache);
+		keep(cache, i, 100);
+	}
+	/* Only its own went, the oldest of them. */
+	assert_int_equal(cache_owned_bytes(cache, 3), 200);
+	assert_int_equal(destroyed[1] + 10 * destroyed[2] + 100 * destroyed[3] + 1000 * destroyed[4] + 10000 * destroyed[5], 110);
+	/* A frame holds what is above the bound until the next one begins. */
+	keep(cache, 6, 100);
+	keep(cache, 7, 100);
+	assert_int_equal(cache_owned_bytes(cache, 3), 300);
+	cache_begin_frame(cache);
+	assert_int_equal(cache_owned_bytes(cache, 3), 200);
+	cache_destroy(cache);
+}
+
 static void least_recently_used_goes_first(void **state)
 {
 	(void)state;
@@ -122,6 +146,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(keys_tell_apart),
 		cmocka_unit_test(bytes_are_counted_for_their_owner),
+		cmocka_unit_test(an_owner_may_have_a_bound_of_its_own),
 		cmocka_unit_test(least_recently_used_goes_first),
 		cmocka_unit_test(a_frame_holds_what_it_uses),
 	};

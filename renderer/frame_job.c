@@ -58,8 +58,7 @@ static bool run_sky(struct frame_job *job)
 
 static bool run_field(struct frame_job *job)
 {
-	const bool above = job->scene->camera.position_m[2] >= job->scene->clouds.base_m;
-	return field_stage_run(&job->renderer->field, &job->renderer->context, job->scene, above, &job->maps);
+	return field_stage_run(&job->renderer->field, &job->renderer->context, job->scene, field_uses(job->scene), &job->maps);
 }
 
 static bool run_radiosity(struct frame_job *job)

@@ -186,6 +186,7 @@ static bool is_cancelled(const struct frame_job *job)
 static void forget_faults(void)
 {
 	pass_was_refused();
+	pass_lacked_texture();
 	gl_failed_otherwise();
 }
 
@@ -236,6 +237,8 @@ static enum render_result run_stages(struct frame_job *job)
 		timing->reused = renderer->context.reused;
 		if (!ok)
 			return result_of_failure(job);
+		if (pass_lacked_texture())
+			return RENDER_FAILED;
 		if (gl_failed(stage_names[i]))
 			return gl_failed_for_memory() ? RENDER_OUT_OF_MEMORY : RENDER_FAILED;
 	}

@@ -17,6 +17,7 @@ struct pass {
 	int outputs;
 	bool compute, adds;
 	GLint arguments, size; /* size: of compute passes */
+	unsigned reads;        /* bit i: the program reads sampler i */
 	char name[64];
 };
 
@@ -152,8 +153,11 @@ static void look_up_uniforms(struct pass *pass, const struct pass_desc *desc)
 	pass->arguments = glGetUniformLocation(pass->program, "arguments");
 	pass->size = glGetUniformLocation(pass->program, "pass_size");
 	for (int i = 0; i < PASS_SAMPLERS_MAX && desc->samplers[i]; i++) {
-		/* -1, a sampler that the compiler found unused, is ignored by OpenGL. */
-		glProgramUniform1i(pass->program, glGetUniformLocation(pass->program, desc->samplers[i]), i);
+		const GLint location = glGetUniformLocation(pass->program, desc->samplers[i]);
+		if (location < 0)
+			continue; /* the compiler found it unused */
+		glProgramUniform1i(pass->program, location, i);
+		pass->reads |= 1u << i;
 	}
 }
 
@@ -243,6 +247,29 @@ static void run_fragment(const struct pass *pass, const struct pass_run *run, in
 		glNamedFramebufferTexture(pass->framebuffer, attachments[i], 0, 0);
 }
 
+static _Thread_local bool lacked_texture;
+
+bool pass_lacked_texture(void)
+{
+	const bool lacked = lacked_texture;
+	lacked_texture = false;
+	return lacked;
+}
+
+/* A unit that nothing is bound to would hold what another pass left there. */
+static void bind_textures(const struct pass *pass, const struct texture *const *textures)
+{
+	for (unsigned i = 0; i < PASS_SAMPLERS_MAX; i++) {
+		const bool given = textures[i] && textures[i]->id;
+		if (given)
+			glBindTextureUnit(i, textures[i]->id);
+		if (given || !(pass->reads >> i & 1))
+			continue;
+		log_error("gl: %s reads a texture that it was not given, number %u", pass->name, i);
+		lacked_texture = true;
+	}
+}
+
 static int level_size(int size, int level)
 {
 	return size >> level > 0 ? size >> level : 1;
@@ -257,9 +284,7 @@ void pass_run(const struct pass *pass, const struct pass_run *run)
 	glUseProgram(pass->program);
 	if (pass->arguments >= 0)
 		glProgramUniform4fv(pass->program, pass->arguments, PASS_ARGUMENTS, &run->arguments[0][0]);
-	for (GLuint i = 0; i < PASS_SAMPLERS_MAX; i++)
-		if (run->samplers[i])
-			glBindTextureUnit(i, run->samplers[i]->id);
+	bind_textures(pass, run->samplers);
 	if (pass->compute)
 		run_compute(pass, run, width, height);
 	else

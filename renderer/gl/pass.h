@@ -48,6 +48,10 @@ struct pass_run {
 	float arguments[PASS_ARGUMENTS][4];
 };
 
+/* Was a pass run without a texture that its program reads (one log line each), since the calling thread asked last? What it drew then
+ * depends on what others left bound, and is to be thrown away. */
+bool pass_lacked_texture(void);
+
 /* Runs. What later passes, copies and read-backs see of the targets is complete (barriers included). */
 void pass_run(const struct pass *pass, const struct pass_run *run);
 

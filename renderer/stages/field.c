@@ -378,7 +378,7 @@ static const struct thickness_field *thickness_field_get(const struct field_stag
 }
 
 static bool thickness_get(const struct field_stage *stage, struct stage_context *context, const struct scene *scene,
-			  const struct coarse_field *coarse, bool from_above, struct field_maps *maps)
+			  const struct coarse_field *coarse, unsigned uses, struct field_maps *maps)
 {
 	const struct thickness_field *thickness = thickness_field_get(stage, context, scene, coarse);
 	if (!thickness)
@@ -387,10 +387,12 @@ static bool thickness_get(const struct field_stage *stage, struct stage_context 
 	maps->smooth = &thickness->smooth;
 	if (stage_is_stopped(context))
 		return false;
-	if (!from_above) {
-		maps->sides = side_light_get(&stage->sides, context, scene, maps->thickness);
-		return maps->sides;
-	}
+	if (uses & FIELD_FROM_BELOW && !(maps->sides = side_light_get(&stage->sides, context, scene, maps->thickness)))
+		return false;
+	if (!(uses & FIELD_FROM_ABOVE))
+		return true;
+	if (stage_is_stopped(context))
+		return false;
 	maps->height = height_field_get(stage, context, scene, coarse);
 	maps->light = maps->height && !stage_is_stopped(context) ? height_light_get(&stage->light, context, scene, maps->height) : NULL;
 	maps->puffs = maps->light && !stage_is_stopped(context) ? height_puffs_get(context) : NULL;
@@ -414,7 +416,14 @@ static bool packed_maps_get(const struct field_stage *stage, struct stage_contex
 	return maps->thickness_packed && maps->coarse_packed && maps->detail_packed;
 }
 
-bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, bool from_above,
+unsigned field_uses(const struct scene *scene)
+{
+	if (scene->camera.position_m[2] < scene->clouds.base_m)
+		return FIELD_FROM_BELOW;
+	return scene->ground.type == GROUND_SEA ? FIELD_FROM_ABOVE | FIELD_FROM_BELOW : FIELD_FROM_ABOVE;
+}
+
+bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, unsigned uses,
 		     struct field_maps *maps)
 {
 	*maps = (struct field_maps){0};
@@ -432,8 +441,8 @@ bool field_stage_run(const struct field_stage *stage, struct stage_context *cont
 	stage_upload_block(context);
 	maps->coarse = &coarse->coarse;
 	maps->detail = &coarse->detail;
-	if (!thickness_get(stage, context, scene, coarse, from_above, maps) ||
-	    (!from_above && !packed_maps_get(stage, context, &scene->clouds, maps)))
+	if (!thickness_get(stage, context, scene, coarse, uses, maps) ||
+	    (uses & FIELD_FROM_BELOW && !packed_maps_get(stage, context, &scene->clouds, maps)))
 		return stage_fails(context, "field");
 	return true;
 }

@@ -24,6 +24,15 @@ struct field_stage {
 	unsigned histogram; /* OpenGL buffer */
 };
 
+/* What maps are wanted for. */
+enum field_use {
+	FIELD_FROM_BELOW = 1,
+	FIELD_FROM_ABOVE = 2 /* height and light */
+};
+
+/* Of a scene: what its camera sees of the layer, and what a sea below mirrors of it. As bits of enum field_use. */
+unsigned field_uses(const struct scene *scene);
+
 struct field_maps {
 	const struct texture *coarse, *detail; /* density before the threshold, and its detail */
 	const struct texture *thickness;       /* over the tile, m, in the frame of the drifting clouds, 256 texels a side */
@@ -40,9 +49,9 @@ struct field_maps {
 bool field_stage_init(struct field_stage *stage, const struct pass_compiler *compiler);
 void field_stage_finish(struct field_stage *stage);
 
-/* Fills in the block's cloud members. Wants slab_slices_get to have run. from_above: height and light are wanted. Maps stay valid for
+/* Fills in the block's cloud members. Wants slab_slices_get to have run. uses: bits of enum field_use. Maps stay valid for
  * this frame; without clouds they are all NULL. false (and a log line) when out of memory. */
-bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, bool from_above,
+bool field_stage_run(const struct field_stage *stage, struct stage_context *context, const struct scene *scene, unsigned uses,
 		     struct field_maps *maps);
 
 #endif

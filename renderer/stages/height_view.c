@@ -79,7 +79,7 @@ static void run_start(const struct pass *pass, const struct field_maps *field, i
 					  .width = start->width,
 					  .first_row = first,
 					  .height = end - first,
-					  .samplers = {field->height, NULL, NULL, begun},
+					  .samplers = {field->height, NULL, NULL, begun ? begun : field->height},
 					  .arguments = {{(float)side, begun ? BLOCK : 0, (float)first_row}}});
 }
 

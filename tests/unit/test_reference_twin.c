@@ -93,7 +93,7 @@ static void run_stages(struct pipeline *pipeline, const struct scene *scene)
 	run_sky(pipeline, scene, scene->clouds.base_m + scene->clouds.thickness_m, &pipeline->at_layer);
 	run_sky(pipeline, scene, 0.1, &pipeline->at_ground);
 	run_sky(pipeline, scene, height, &pipeline->sky_tables);
-	assert_true(field_stage_run(&pipeline->field, context, scene, height > scene->clouds.base_m, &pipeline->maps));
+	assert_true(field_stage_run(&pipeline->field, context, scene, field_uses(scene), &pipeline->maps));
 	assert_true(radiosity_stage_run(&pipeline->radiosity, context, scene, &pipeline->ground_maps, &pipeline->sky_tables,
 					&pipeline->maps, slab_rows, &pipeline->light));
 	stage_upload_block(context);

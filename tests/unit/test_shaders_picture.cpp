@@ -239,7 +239,7 @@ static void run_stages(const scene &scene, made &out)
 	assert_true(slab_slices_get(context, &scene, out.drops, &out.slab_slices));
 	assert_true(ground_stage_run(&shared.ground, context, &scene, &out.ground));
 	assert_true(sky_stage_run(&shared.sky, context, &scene, albedo, &out.sky));
-	assert_true(field_stage_run(&shared.field, context, &scene, scene.camera.position_m[2] > scene.clouds.base_m, &out.field));
+	assert_true(field_stage_run(&shared.field, context, &scene, field_uses(&scene), &out.field));
 	for (int band = 0; band < 3; band++)
 		context->block.air_below[band] = 1;
 	if (clouds)

@@ -225,9 +225,8 @@ static bool make(struct deck *deck, const struct scene *scene, struct made *made
 			     ground = made->ground.mean[band];
 		albedo[band] = r + (1 - r) * (1 - r) * ground / (1 - r * ground);
 	}
-	const bool above = scene->camera.position_m[2] > scene->clouds.base_m;
 	return sky_stage_run(&deck->sky, context, scene, albedo, &made->sky) &&
-	       field_stage_run(&deck->field, context, scene, above, &made->field) &&
+	       field_stage_run(&deck->field, context, scene, field_uses(scene), &made->field) &&
 	       radiosity_stage_run(&deck->radiosity, context, scene, &made->ground, &made->sky, &made->field, made->slab_rows,
 				   &made->light);
 }

@@ -23,7 +23,7 @@ static const double first_step = 0.75;
  * the root mean square distance from its middle. The distances are sharply peaked with a long tail: by tracing light through layers of an
  * optical thickness of 12 to 40 under suns at 35 and 65 degrees (g = 0.85), what was scattered six times and more lies within 0.3, 0.5,
  * 0.9, 1.5 and 2.35 eta at 10, 25, 50, 75 and 90 %. Two squares that give the same within a few percent: sides in eta, and the weight of
- * the short one. */
+ * the short one. Under a sun at 7 degrees the distances are a tenth less. */
 static const double short_side = 1.73, long_side = 4.6, short_weight = 0.6;
 
 bool height_light_init(struct height_light_stage *stage, const struct pass_compiler *compiler)

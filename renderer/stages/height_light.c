@@ -18,9 +18,13 @@ static const double lowest_sun = 0.035;
 /* Distance to the nearest place that can throw a shadow, in texels. */
 static const double first_step = 0.75;
 
-/* Light that is scattered a few times comes out again near where it went in, that scattered often after the smoothing length: the short
- * length as a share of the long one, and its weight. */
-static const double short_length = 0.3, short_weight = 0.4;
+/* How far from where it went in often scattered light comes out again. The smoothing length eta = sqrt(H / ((1-g) sigma)) is a root mean
+ * square displacement but for a factor of 1.4 (Marshak et al. 1998), and a square that light is evened out over is sqrt(6) times as long as
+ * the root mean square distance from its middle. The distances are sharply peaked with a long tail: by tracing light through layers of an
+ * optical thickness of 12 to 40 under suns at 35 and 65 degrees (g = 0.85), what was scattered six times and more lies within 0.3, 0.5,
+ * 0.9, 1.5 and 2.35 eta at 10, 25, 50, 75 and 90 %. Two squares that give the same within a few percent: sides in eta, and the weight of
+ * the short one. Under a sun at 7 degrees the distances are a tenth less. */
+static const double short_side = 1.73, long_side = 4.6, short_weight = 0.6;
 
 bool height_light_init(struct height_light_stage *stage, const struct pass_compiler *compiler)
 {
@@ -85,7 +89,7 @@ static void compute(const struct height_light_stage *stage, const struct scene_b
 	pass_run(stage->passes[PASS_SOFTEN],
 		 &(struct pass_run){.targets = (struct texture *[]){&tables->light},
 				    .samplers = {height, &tables->received},
-				    .arguments = {{(float)(short_length * smoothing), (float)smoothing, (float)short_weight}}});
+				    .arguments = {{(float)(short_side * smoothing), (float)(long_side * smoothing), (float)short_weight}}});
 	texture_build_mipmaps(&tables->light);
 }
 

@@ -1,5 +1,5 @@
 // The height field's surface as it is looked up: x, y slopes to the east and to the north; z height above which there is no shadow, at least that of the top, m;
-// w what light that is scattered often has received, relative to a horizontal plane: spread sideways over two lengths, arguments[0].x and .y, m, with the weight .z of the first, and with the flux that the beams bring.
+// w what light that is scattered often has received, relative to a horizontal plane: spread sideways over squares of two sizes, arguments[0].x and .y, m, with the weight .z of the first, and with the flux that the beams bring.
 #include "shaders/lib/bicubic.glsl"
 #include "shaders/lib/height_sun.glsl"
 

@@ -7,7 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE = 8, BASE_M = 1000, BOUNDS_SIDE = 64, ROUNDS = 4 };
+enum { SIDE = 8, BASE_M = 1000, BOUNDS_SIDE = 64, ROUNDS = 4, FLUX_ZENITHS = 12, FLUX_AZIMUTHS = 24 };
+
+/* Asymmetry of the lobe in which half of the directions are drawn that irradiance is made of. */
+static const double FLUX_LOBE = 0.95;
 
 static void set_texture(struct twin *twin, enum twin_sampler sampler, const float *texels, int width, int height, bool repeat, bool nearest)
 {
@@ -148,5 +151,92 @@ struct layer_seen layer_see(struct uniform_layer *layer, bool above, double mu_v
 		seen.mean[band] = sum / count;
 		seen.error[band] = sqrt(fmax(0, square / count - seen.mean[band] * seen.mean[band]) / (count - 1));
 	}
+	return seen;
+}
+
+/* 0..1, by the numbers of a thing and of what is asked of it. */
+static double even_unit(uint32_t number, uint32_t dimension)
+{
+	uint32_t hash = (number + 1) * 0x9e3779b9u ^ (dimension + 1) * 0x85ebca6bu;
+	for (int i = 0; i < 2; i++)
+		hash = (hash ^ hash >> 16) * 0x7feb352du;
+	return ((hash ^ hash >> 15) >> 8) * 0x1p-24;
+}
+
+/* Density per solid angle about the beam's direction (Henyey and Greenstein 1941): where thin layers send most of what comes through. */
+static double lobe_density(double cosine)
+{
+	return (1 - FLUX_LOBE * FLUX_LOBE) / (4 * M_PI * pow(1 + FLUX_LOBE * FLUX_LOBE - 2 * FLUX_LOBE * cosine, 1.5));
+}
+
+/* Directions in which light goes, the beam towards -x and down: even in irradiance, on one side of the layer; and of the lobe. */
+static void flux_direction(double share, double around, bool above, double to[3])
+{
+	const double sine = sqrt(1 - share), mu = fmax(sqrt(share), 1e-3);
+	to[0] = sine * cos(2 * M_PI * around);
+	to[1] = sine * sin(2 * M_PI * around);
+	to[2] = above ? mu : -mu;
+}
+
+static void lobe_direction(const struct uniform_layer *layer, double share, double around, double to[3])
+{
+	const double g = FLUX_LOBE, zenith = layer->is.sun_zenith_deg * M_PI / 180, spread = (1 - g * g) / (1 - g + 2 * g * share);
+	const double cosine = (1 + g * g - spread * spread) / (2 * g), sine = sqrt(fmax(0, 1 - cosine * cosine));
+	const double x = sine * cos(2 * M_PI * around);
+	to[0] = -cosine * sin(zenith) + x * cos(zenith);
+	to[1] = sine * sin(2 * M_PI * around);
+	to[2] = -cosine * cos(zenith) - x * sin(zenith);
+}
+
+/* Adds what goes one way, weighed by the density of both kinds of directions (balance heuristic). */
+static void add_direction(struct uniform_layer *layer, bool above, const double to[3], int each, int threads, double sum[3])
+{
+	static float color[SIDE * SIDE * 4];
+	float *outputs[TWIN_OUTPUTS] = {color};
+	const double zenith = layer->is.sun_zenith_deg * M_PI / 180, mu = fabs(to[2]);
+	const double density = mu / M_PI + lobe_density(-to[0] * sin(zenith) - to[2] * cos(zenith));
+	if ((to[2] > 0) != above)
+		return;
+	look(layer, above, mu, atan2(-to[1], -to[0]));
+	memset(color, 0, sizeof color);
+	twin_run(&layer->twin, SIDE, SIDE, 0, each, threads, outputs);
+	layer->twin.seed++;
+	for (int i = 0; i < SIDE * SIDE; i++)
+		for (int band = 0; band < 3; band++)
+			sum[band] += mu / density * color[4 * i + band] / ((double)each * SIDE * SIDE * FLUX_ZENITHS * FLUX_AZIMUTHS);
+}
+
+static void add_cells(struct uniform_layer *layer, bool above, int replicate, int each, int threads, double sum[3])
+{
+	for (int i = 0; i < 2 * FLUX_ZENITHS * FLUX_AZIMUTHS; i++) {
+		const uint32_t number = (uint32_t)(2 * replicate * FLUX_ZENITHS * FLUX_AZIMUTHS + i);
+		const int cell = i / 2;
+		const double share = (cell % FLUX_ZENITHS + even_unit(number, 0)) / FLUX_ZENITHS;
+		const double around = (cell / FLUX_ZENITHS + even_unit(number, 1)) / FLUX_AZIMUTHS;
+		double to[3];
+		if (i % 2)
+			lobe_direction(layer, share, around, to);
+		else
+			flux_direction(share, around, above, to);
+		add_direction(layer, above, to, each, threads, sum);
+	}
+}
+
+struct layer_seen layer_irradiance(struct uniform_layer *layer, bool above, int replicates, int samples, int threads)
+{
+	struct layer_seen seen = {{0}, {0}};
+	const int each = (int)fmax(1, round((double)samples / replicates / (2 * SIDE * SIDE * FLUX_ZENITHS * FLUX_AZIMUTHS)));
+	for (int n = 0; n < replicates; n++) {
+		double sum[3] = {0};
+		path_chains_draw(layer->chains, layer->is.tables, layer->twin.block.sun_direction[3], 1, (uint64_t)(layer->rounds++));
+		add_cells(layer, above, n, each, threads, sum);
+		for (int band = 0; band < 3; band++) {
+			const double off = sum[band] - seen.mean[band];
+			seen.mean[band] += off / (n + 1);
+			seen.error[band] += off * (sum[band] - seen.mean[band]);
+		}
+	}
+	for (int band = 0; band < 3; band++)
+		seen.error[band] = sqrt(seen.error[band] / (replicates - 1) / replicates);
 	return seen;
 }

@@ -34,4 +34,9 @@ struct layer_seen {
 };
 struct layer_seen layer_see(struct uniform_layer *layer, bool above, double mu_v, double azimuth, int samples, int threads);
 
+/* Irradiance of all that the layer sends up (above) or down through a horizontal plane, likewise. Directions are drawn in cells, one each,
+ * that are even in irradiance or in a lobe about the beam; all cells again `replicates` times (at least 2), whose scatter is the error.
+ * samples: of all, about. */
+struct layer_seen layer_irradiance(struct uniform_layer *layer, bool above, int replicates, int samples, int threads);
+
 #endif

@@ -45,7 +45,7 @@ const struct bound bounds[BOUND_COUNT] = {
 	{"light paths in uniform layers, radiance against the solver: within 3 standard errors", TALLY_PATHS_LAYER, STATISTIC_SHARE, 0.98,
 	 1, "%"},
 	{"R, T likewise, worst, in 3 standard errors", TALLY_PATHS_FLUX, STATISTIC_WORST, 1, 1, ""},
-	{"standard error of those radiances, largest", TALLY_PATHS_ERROR, STATISTIC_WORST, 0.01, 1, "%"},
+	{"standard error of those radiances, of R and of T, largest", TALLY_PATHS_ERROR, STATISTIC_WORST, 0.01, 1, "%"},
 	{"light paths in a thin layer against single scattering", TALLY_PATHS_THIN, STATISTIC_WORST, 0.01, 1, "%"},
 	{"light paths in a white furnace, from 1", TALLY_PATHS_FURNACE, STATISTIC_WORST, 0.01, 1, "%"},
 	/* Missed by software OpenGL by far: shown, but no failure of the run. */

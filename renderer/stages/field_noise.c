@@ -99,7 +99,7 @@ static const struct cloud_kind {
 			       .displacement = 60},
 	[CLOUD_CIRROCUMULUS] =
 		{.profile = {1.6, 0.12, 0.03},
-		 .layers = {{.length = 95, .life = 500, .stretch = 1.5, .dome = 0.9, .roll = 0.2, .scatter = 0.85, .spread = 0.3}},
+		 .layers = {{.length = 95, .life = 500, .stretch = 1.3, .dome = 0.95, .roll = 0.06, .scatter = 1.0, .spread = 0.5}},
 		 .open = -1,
 		 .meso = 0.5,
 		 .meso_outer = 6000,

@@ -164,7 +164,7 @@ vec3 ground_detail(ground_point p)
 	dry += shown * patches.x;
 	float tufts = 0.0;
 #if VIEW_GROUND_CLOSE
-	tufts = ground_tufts(p, patches) * (1.0 - smoothstep(0.4, 0.8, p.mu_v)) * (1.0 - smoothstep(0.3 * GROUND_TUFTS_END, GROUND_TUFTS_END, p.across));
+	tufts = ground_tufts(p, patches) * (1.0 - smoothstep(0.1, 0.45, p.mu_v)) * (1.0 - smoothstep(0.3 * GROUND_TUFTS_END, GROUND_TUFTS_END, p.across));
 #endif
 	return vec3(1.0, max(1.0 + ground_patch.y * (0.36 * tone + 0.9 * tufts), 0.15), 0.15 * dry + 0.1 * tufts);
 }

@@ -103,6 +103,24 @@ static void what_was_not_measured_breaks(void **state)
 	}
 }
 
+static void one_part_is_judged_alone(void **state)
+{
+	(void)state;
+	char text[4096] = "";
+	struct measurements one = {.of_one_part = true};
+	assert_false(bounds_hold(&one)); /* nothing at all */
+	tally_add(&one.tally[TALLY_CONSERVATION], 0, "tau 3");
+	assert_true(bounds_hold(&one));
+	FILE *file = fmemopen(text, sizeof text, "w");
+	assert_non_null(file);
+	bounds_print(file, &one);
+	fclose(file);
+	assert_null(strstr(text, "no number"));
+	assert_non_null(strstr(text, "| R + T = 1, independent sums |"));
+	tally_add(&one.tally[TALLY_CONSERVATION], 0.02, "tau 3");
+	assert_false(bounds_hold(&one));
+}
+
 /* The table names the broken one. */
 static void table_says_so(void **state)
 {
@@ -122,9 +140,13 @@ static void table_says_so(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(every_tally_is_judged),        cmocka_unit_test(good_values_hold),
-		cmocka_unit_test(one_bad_value_breaks),         cmocka_unit_test(times_are_tolerated),
-		cmocka_unit_test(what_was_not_measured_breaks), cmocka_unit_test(table_says_so),
+		cmocka_unit_test(every_tally_is_judged),
+		cmocka_unit_test(good_values_hold),
+		cmocka_unit_test(one_bad_value_breaks),
+		cmocka_unit_test(times_are_tolerated),
+		cmocka_unit_test(what_was_not_measured_breaks),
+		cmocka_unit_test(one_part_is_judged_alone),
+		cmocka_unit_test(table_says_so),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

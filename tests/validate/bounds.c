@@ -94,12 +94,22 @@ enum verdict bound_judge(const struct bound *bound, const struct measurements *m
 	return value <= bound->limit * bound->tolerance ? VERDICT_TOLERATED : VERDICT_BROKEN;
 }
 
+static bool is_left_out(const struct bound *bound, const struct measurements *measurements)
+{
+	return measurements->of_one_part && measurements->tally[bound->tally].count == 0;
+}
+
 bool bounds_hold(const struct measurements *measurements)
 {
-	for (int i = 0; i < BOUND_COUNT; i++)
+	int judged = 0;
+	for (int i = 0; i < BOUND_COUNT; i++) {
+		if (is_left_out(&bounds[i], measurements))
+			continue;
 		if (bound_judge(&bounds[i], measurements) == VERDICT_BROKEN)
 			return false;
-	return true;
+		judged++;
+	}
+	return judged > 0;
 }
 
 static void print_value(FILE *file, const struct bound *bound, double value)
@@ -119,6 +129,8 @@ void bounds_print(FILE *file, const struct measurements *measurements)
 	for (int i = 0; i < BOUND_COUNT; i++) {
 		const struct bound *bound = &bounds[i];
 		const struct tally *tally = &measurements->tally[bound->tally];
+		if (is_left_out(bound, measurements))
+			continue;
 		fprintf(file, "| %s |", bound->what);
 		print_value(file, bound, bound_value(bound, measurements));
 		print_value(file, bound, bound->limit);

@@ -64,6 +64,7 @@ struct tally {
 
 struct measurements {
 	struct tally tally[TALLY_COUNT];
+	bool of_one_part; /* bounds that nothing was measured for belong to the other parts, and are left out */
 };
 
 /* format and what follows say where, should this be the worst. An error that is not a number stays the worst. */

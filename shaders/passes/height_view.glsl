@@ -52,11 +52,11 @@ height_surface height_surface_at(vec3 direction, float t)
 	slope = (slope + scale * vec2(puff.y, puff.z)) / max(1.0 - scale * puff.w, 0.4);
 	height += scale * puff.x;
 	// Of the light that is scattered often, creases get less.
-	received *= 1.0 + 0.4 * puff.x * scale / (scale + 30.0);
+	received *= 1.0 + 0.3 * puff.x * scale / (scale + 30.0);
 #endif
 	slope = height_slope_seen(slope, direction, t);
 	// Slopes get it as they face the sun.
-	float facing = 1.0 - 0.15 * dot(slope - vec2(light), height_sun_heading()) / max(height_sun_rise(), 0.3);
+	float facing = 1.0 - 0.06 * dot(slope - vec2(light), height_sun_heading()) / max(height_sun_rise(), 0.3);
 	received *= clamp(facing, 0.6, 1.5);
 	height_surface at;
 	at.place = vec4(t, 0.0, height, height_smooth(place, footprint));

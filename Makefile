@@ -266,7 +266,7 @@ validate: packages
 	@$(MAKE) --no-print-directory -j$$(nproc) $(B)/stratus-validate && $(MAKE) --no-print-directory kernel
 	@scripts/validate.sh $(B)
 
-# Figures are kept in out/judge until that is deleted.
+# Figures are kept in out/judge for a run that was stopped; another program, or other scenes, begin anew.
 judge: packages
 	@scripts/packages.sh $(GALLERY_PACKAGES) python3
 	@$(MAKE) --no-print-directory -j$$(nproc) programs && $(MAKE) --no-print-directory kernel

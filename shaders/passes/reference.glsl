@@ -90,6 +90,11 @@ void reference_first(INOUT(light_path) path, INOUT(reference_sums) sums, int wha
 	vec3 to_end = vec3(textureLod(air_to_end, air, 0.0));
 	vec3 passes = path_weight(path, vec3(1.0));
 #if REFERENCE_ABOVE
+	// From inside the layer cloud overhead is met at once.
+	if (what == 0 && path.direction.z > 0.0 && camera_position.z < cloud_layer.x + cloud_layer.y) {
+		near = vec3(0.0);
+		to_layer = vec3(1.0);
+	}
 	vec3 behind = max(total - near, vec3(0.0)) * vec3(air_below) + max(to_layer - to_end, vec3(0.0)) * vec3(air_around);
 	if (what == 2) {
 		reference_add(sums, KIND_SKY, total * passes);

@@ -1,7 +1,7 @@
 """Measures how far the slab is from its reference over the scenes beside this file: judge.py PAGE [BUILD_DIR]. scripts/judge.sh starts the daemon.
 
 Each scene is rendered solved, in the paper's shading, by the reference, and by the reference once more with another seed and fewer samples, which
-must differ from it by noise alone. The figures of finished scenes are kept in out/judge, so that a run that was stopped goes on; the page is written
+must differ from it by noise alone. The figures of finished scenes are kept in the folder JUDGE_KEPT, so that a run that was stopped goes on; the page is written
 from all of them. JUDGE_SAMPLES=N takes others than 64 samples, for a quick look. Without BUILD_DIR nothing is rendered: the page is written
 from what there is.
 """
@@ -17,7 +17,7 @@ SCENES = pathlib.Path(__file__).parent / "scenes"
 WIDTH, HEIGHT = 160, 120
 SAMPLES = int(os.environ.get("JUDGE_SAMPLES", 64))
 SAMPLES_AGAIN = max(2, SAMPLES // 4)
-KEPT = pathlib.Path("out/judge") / str(SAMPLES)
+KEPT = pathlib.Path(os.environ.get("JUDGE_KEPT", "out/judge"))
 REGIONS = ("cloud", "sky", "ground")
 BIAS_BOUND, RMS_BOUND = 5, 15  # percent
 # So many pixels make a figure.

@@ -1,5 +1,6 @@
 /* The reference model as scenes ask for it: parts that add up, seeds, ends by time and by cancelling. */
 #include "renderer/gl/timer.h"
+#include "renderer/scene_map.h"
 #include "tests/unit/test_renderer_common.h"
 
 enum { WIDTH = 24, HEIGHT = 18, PIXELS = WIDTH * HEIGHT };
@@ -50,6 +51,36 @@ static void parts_add_up(void **state)
 		for (int i = LAYER_ORDER1; i <= LAYER_GROUND; i++)
 			assert_true(mean_luminance(&frame, (enum layer)i) > 0 || (above && i == LAYER_SKY) || i == LAYER_SKY);
 		frame_finish(&frame);
+	}
+}
+
+/* A step over the base changes nothing of an even layer overhead, nor one under the tops of what lies below. */
+static void the_inside_follows_from_the_outside(void **state)
+{
+	static const unsigned char hash[SCENE_MAP_HASH_BYTES] = {3};
+	struct scene_map *map = scene_map_create(8, 8, 1, hash);
+	(void)state;
+	assert_non_null(map);
+	for (int i = 0; i < 64; i++)
+		map->values[i] = 1;
+	scene_map_seal(map);
+	for (int above = 0; above < 2; above++) {
+		double means[2] = {0}; /* of blue, which air adds most to */
+		for (int inside = 0; inside < 2; inside++) {
+			struct scene scene = reference_scene(48, LAYER(COLOR));
+			scene.clouds.map.map = map;
+			scene.clouds.base_m = 1200;
+			scene.clouds.thickness_m = 150;
+			scene.camera.position_m[2] = above ? (inside ? 1349.8 : 1350.2) : inside ? 1200.1 : 1199.9;
+			scene.camera.elevation_deg = above ? -60 : 60;
+			scene.camera.azimuth_deg = scene.sun.azimuth_deg + 180;
+			struct frame frame = render(&scene);
+			for (int i = 0; i < PIXELS; i++)
+				means[inside] += pixel_of(&frame, LAYER_COLOR, i % WIDTH, i / WIDTH)[2] / PIXELS;
+			frame_finish(&frame);
+		}
+		print_message("%s, outside and inside: %.3f, %.3f\n", above ? "down" : "up", means[0], means[1]);
+		assert_true(fabs(means[1] - means[0]) < 0.03 * means[0]);
 	}
 }
 
@@ -238,6 +269,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(parts_add_up),
+		cmocka_unit_test(the_inside_follows_from_the_outside),
 		cmocka_unit_test(seeds_make_the_picture),
 		cmocka_unit_test(standard_error_is_the_scatter),
 		cmocka_unit_test(disc_is_that_of_the_slab),

@@ -106,7 +106,7 @@ class Atmosphere(Section):
 
 @dataclass(slots=True, kw_only=True)
 class Camera(Section):
-    """Not inside the cloud layer."""
+    """Not inside the cloud layer, but for the model reference."""
 
     # -1000000 to 1000000; -1000000 to 1000000; 0.1 to 30000. default [0, 0, 2]. East, north, above ground.
     position_m: tuple[float, float, float] | None = member(limits=[(-1000000, 1000000), (-1000000, 1000000), (0.1, 30000)], default=[0, 0, 2])

@@ -266,8 +266,8 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 	memcpy(run->samplers + common_count, clouds, sizeof clouds);
 }
 
-/* Columns that are looked at together whether they are long strips. */
-enum { PIECE_COLUMNS = 32 };
+/* Pixels a side of the pieces that are looked at together whether their views are low. */
+enum { PIECE_SIDE = 32 };
 
 /* Pixels that look up at the layer and have this in common; where they lie, and of which picture, is laid down in a run. */
 struct up_pixels {
@@ -289,15 +289,15 @@ static bool run_up_columns(struct view_stage *stage, struct up_pixels pixels, co
 	return pass;
 }
 
-/* Rows of which some pixels are long strips along the layer: those that are, and those that are not, by programs of their own. */
-static bool run_up_some_along(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view,
-			      struct up_pixels pixels, const struct pass_run *run)
+/* Rows of which some views are low: those that are, and those that are not, by programs of their own. */
+static bool run_up_some_low(struct view_stage *stage, const struct scene_block *block, const struct camera_view *view,
+			    struct up_pixels pixels, const struct pass_run *run)
 {
 	const int row = run->first_row, end_row = row + run->height;
 	for (int first = 0, next; first < run->width; first = next) {
-		pixels.reach = view_rows_along(block, view, row, end_row, first, first + PIECE_COLUMNS);
-		for (next = first + PIECE_COLUMNS; next < run->width; next += PIECE_COLUMNS)
-			if (view_rows_along(block, view, row, end_row, next, next + PIECE_COLUMNS) != pixels.reach)
+		pixels.reach = view_rows_low(block, view, row, end_row, first, first + PIECE_SIDE);
+		for (next = first + PIECE_SIDE; next < run->width; next += PIECE_SIDE)
+			if (view_rows_low(block, view, row, end_row, next, next + PIECE_SIDE) != pixels.reach)
 				break;
 		if (!run_up_columns(stage, pixels, run, first, next < run->width ? next : run->width))
 			return false;
@@ -314,14 +314,15 @@ static bool run_up(struct view_stage *stage, const struct scene_block *block, co
 		const enum view_up_reach reach = pixels.reach = view_rows_reach(block, view, first);
 		pixels.disc = view_rows_disc(block, variant.large_sun, first);
 		for (next = first + 1; next < end; next++)
-			if (view_rows_reach(block, view, next) != reach || view_rows_disc(block, variant.large_sun, next) != pixels.disc)
+			if ((reach == VIEW_UP_SOME_LOW && next - first == PIECE_SIDE) || view_rows_reach(block, view, next) != reach ||
+			    view_rows_disc(block, variant.large_sun, next) != pixels.disc)
 				break;
 		run->first_row = first;
 		run->height = next - first;
 		if (pixels.reach == VIEW_UP_NEAR && pixels.disc != VIEW_UP_NO_DISC)
 			pixels.reach = VIEW_UP_FAR; /* no program is worth making for a few rows */
-		if (!(pixels.reach == VIEW_UP_SOME_ALONG ? run_up_some_along(stage, block, view, pixels, run)
-							 : run_up_columns(stage, pixels, run, 0, run->width)))
+		if (!(pixels.reach == VIEW_UP_SOME_LOW ? run_up_some_low(stage, block, view, pixels, run)
+						       : run_up_columns(stage, pixels, run, 0, run->width)))
 			return false;
 	}
 	return true;

@@ -64,14 +64,20 @@ static bool row_is_near(const struct scene_block *block, const struct camera_vie
 	return mu_v > 0.01 && block->camera_position[3] * distance / slant < block->cloud_layer[2] / texels;
 }
 
-/* Does a direction of this sine of elevation, or one at the horizon if it is below that, see the layer along it? FIELD_ALONG_COSINE in
- * shaders/lib/field.glsl. */
-static bool sees_along(const struct scene_block *block, double sine)
+/* Cosine to the vertical at the layer's base of a direction of this sine of elevation, or of one at the horizon if it is below that. */
+static double cosine_at_base(const struct scene_block *block, double sine)
 {
 	sine = fmax(sine, view_rows_horizon(block, 0));
-	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0], along_cosine = 0.12;
-	const double b = (radius + h) * sine, distance = sqrt(b * b + (base - h) * (2 * radius + base + h)) - b;
-	return b + distance < along_cosine * (radius + base);
+	const double radius = 6371000.0, h = block->camera_position[2], base = block->cloud_layer[0];
+	return sqrt(pow((radius + h) * sine, 2) + (base - h) * (2 * radius + base + h)) / (radius + base);
+}
+
+/* Of pixels between two sines of elevation. SIDE_LOW_ALL and SIDE_LOW_NONE in shaders/lib/side_low.glsl. */
+static enum view_up_reach reach_between(const struct scene_block *block, double lowest, double highest)
+{
+	if (cosine_at_base(block, lowest) >= 0.34)
+		return VIEW_UP_FAR;
+	return cosine_at_base(block, fmin(highest, 1)) < 0.3 ? VIEW_UP_LOW : VIEW_UP_SOME_LOW;
 }
 
 enum view_up_disc view_rows_disc(const struct scene_block *block, bool large_sun, int row)
@@ -86,13 +92,14 @@ enum view_up_reach view_rows_reach(const struct scene_block *block, const struct
 {
 	double lowest, highest;
 	bound_row(view, row, &lowest, &highest);
-	if (view->projection != PROJECTION_FISHEYE && sees_along(block, lowest))
-		return sees_along(block, fmin(highest, 1)) ? VIEW_UP_ALONG : VIEW_UP_SOME_ALONG;
+	const enum view_up_reach reach = reach_between(block, lowest, highest);
+	if (reach != VIEW_UP_FAR)
+		return reach;
 	return row_is_near(block, view, row) ? VIEW_UP_NEAR : VIEW_UP_FAR;
 }
 
-enum view_up_reach view_rows_along(const struct scene_block *block, const struct camera_view *view, int first_row, int end_row,
-				   int first_column, int end_column)
+enum view_up_reach view_rows_low(const struct scene_block *block, const struct camera_view *view, int first_row, int end_row,
+				 int first_column, int end_column)
 {
 	/* What lies between the corners bulges by the square of their distance at most. */
 	const double size = camera_pixel_angle(view) * fmax(end_row - first_row, end_column - first_column), bulge = size * size;
@@ -104,7 +111,5 @@ enum view_up_reach view_rows_along(const struct scene_block *block, const struct
 		lowest = fmin(lowest, direction[2] - bulge);
 		highest = fmax(highest, direction[2] + bulge);
 	}
-	if (!sees_along(block, lowest))
-		return VIEW_UP_FAR;
-	return sees_along(block, fmin(highest, 1)) ? VIEW_UP_ALONG : VIEW_UP_SOME_ALONG;
+	return reach_between(block, lowest, highest);
 }

@@ -20,8 +20,8 @@ enum view_up_reach view_rows_reach(const struct scene_block *block, const struct
 /* large_sun: sun_disc.large. */
 enum view_up_disc view_rows_disc(const struct scene_block *block, bool large_sun, int row);
 
-/* Of a rectangle in rows of VIEW_UP_SOME_ALONG: that, VIEW_UP_ALONG or VIEW_UP_FAR. */
-enum view_up_reach view_rows_along(const struct scene_block *block, const struct camera_view *view, int first_row, int end_row,
-				   int first_column, int end_column);
+/* Of a rectangle in rows of VIEW_UP_SOME_LOW: that, VIEW_UP_LOW or VIEW_UP_FAR. */
+enum view_up_reach view_rows_low(const struct scene_block *block, const struct camera_view *view, int first_row, int end_row,
+				 int first_column, int end_column);
 
 #endif

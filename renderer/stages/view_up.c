@@ -24,12 +24,12 @@ static const struct pass_desc light_desc = {
 const struct pass *view_up_pass(struct view_up_stage *stage, enum projection projection, bool packed, enum view_up_reach reach,
 				enum view_up_disc disc, int details)
 {
-	static const char *const reaches[VIEW_UP_REACHES] = {"", "#define FIELD_NEAR 1\n", "#define FIELD_ALONG 1\n",
-							     "#define FIELD_ALONG 2\n"};
+	static const char *const reaches[VIEW_UP_REACHES] = {"", "#define FIELD_NEAR 1\n", "#define SIDE_LOW 1\n", "#define SIDE_LOW 2\n"};
 	struct pass **pass = &stage->look[projection][packed][reach][disc][details - 1];
 	char defines[512];
 	snprintf(defines, sizeof defines,
-		 "%s%s%s#define VIEW_PROJECTION %d\n#define UP_DISC %d\n#define VIEW_LARGE_SUN %d\n#define FIELD_DETAIL_TILES %d\n",
+		 "%s%s%s#ifndef SIDE_LOW\n#define SIDE_LOW 0\n#endif\n#define VIEW_PROJECTION %d\n#define UP_DISC %d\n#define "
+		 "VIEW_LARGE_SUN %d\n#define FIELD_DETAIL_TILES %d\n",
 		 DEFINES, packed ? "#define FIELD_PACKED 1\n" : "", reaches[reach], projection, disc != VIEW_UP_NO_DISC,
 		 disc == VIEW_UP_LARGE_DISC, details);
 	if (!*pass)
@@ -50,8 +50,8 @@ bool view_up_init(struct view_up_stage *stage, const struct pass_compiler *compi
 	for (int i = 0; ok && i < VIEW_UP_AIR_TABLES; i++)
 		ok = texture_init(&stage->air_tables[i], AIR_WIDTH, AIR_HEIGHT, TEXTURE_RGBA32F, 0);
 	ok = ok && view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_FAR, false, 1) &&
-	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_ALONG, VIEW_UP_NO_DISC, 1) &&
-	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_SOME_ALONG, VIEW_UP_NO_DISC, 1);
+	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_LOW, VIEW_UP_NO_DISC, 1) &&
+	     view_up_pass(stage, PROJECTION_PERSPECTIVE, true, VIEW_UP_SOME_LOW, VIEW_UP_NO_DISC, 1);
 	if (!ok)
 		view_up_finish(stage);
 	return ok;

@@ -11,9 +11,9 @@
 
 enum { VIEW_UP_AIR_TABLES = 3, VIEW_UP_DETAILS = 3 };
 
-/* How far away the layer is in some rows of pixels: anywhere; none is larger than half a texel of the field, nor shows the sun's disc; so
- * low that each, or some, are long strips (FIELD_ALONG_COSINE in shaders/lib/field.glsl). */
-enum view_up_reach { VIEW_UP_FAR, VIEW_UP_NEAR, VIEW_UP_ALONG, VIEW_UP_SOME_ALONG, VIEW_UP_REACHES };
+/* How far away the layer is in some rows of pixels: anywhere; none is larger than half a texel of the field, nor shows the sun's disc;
+ * each, or some, look so low that clouds stand to them (shaders/lib/side_low.glsl). */
+enum view_up_reach { VIEW_UP_FAR, VIEW_UP_NEAR, VIEW_UP_LOW, VIEW_UP_SOME_LOW, VIEW_UP_REACHES };
 
 /* What rows of pixels show of the sun's disc (shaders/lib/sun_disc.glsl): nothing, one whose light was spread over pixels beforehand, one
  * that is large. */

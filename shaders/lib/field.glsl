@@ -180,10 +180,9 @@ float field_thickness_shadow(vec2 place, float footprint)
 const float FIELD_ALONG_COSINE = 0.12;
 const int FIELD_ALONG_PARTS = 4;
 
-// What a pixel sees of the layer over its strip. x: the thickness that lets as much through as the strip does on the whole; y: what light scattered once is of what that
-// thickness would make of it; z: mean thickness where there is cloud. mu_v: cosine of the view to the vertical; heading: of the view, any length; extinction_per_m: of the
-// light that is averaged.
-vec3 field_thickness_along(vec2 place, vec2 heading, float footprint, float mu_v, float extinction_per_m)
+// What a pixel sees of the layer over its strip. x: the thickness that lets as much through as the strip does on the whole; y: mean thickness where there is cloud. mu_v: cosine of
+// the view to the vertical; heading: of the view, any length; extinction_per_m: of the light that is averaged.
+vec2 field_thickness_along(vec2 place, vec2 heading, float footprint, float mu_v, float extinction_per_m)
 {
 	// camera_footprint is as much longer than the pixel is wide as the strip is longer than it.
 	float flatness = 1.0 - smoothstep(0.5 * FIELD_ALONG_COSINE, FIELD_ALONG_COSINE, mu_v);
@@ -204,8 +203,7 @@ vec3 field_thickness_along(vec2 place, vec2 heading, float footprint, float mu_v
 	float sum = dot(seen, vec4(1.0));
 	float mean = least - log(sum / float(FIELD_ALONG_PARTS));
 	vec4 met = vec4(1.0) - exp(-depth);
-	return vec3(mean * mu_v / extinction_per_m, mean > 1e-4 ? min(dot(depth, seen) / (mean * sum), 1.0) : 1.0,
-	            dot(thickness, met) / max(dot(met, vec4(1.0)), 1e-6));
+	return vec2(mean * mu_v / extinction_per_m, dot(thickness, met) / max(dot(met, vec4(1.0)), 1e-6));
 }
 
 float field_thickness(vec2 place, float footprint)

@@ -33,15 +33,30 @@ vec4 packed_texel(sampler2D from, vec2 place, int side, float size)
 	return textureLod(from, (place * size + origin) * (vec2(2.0 / 3.0, 1.0) / whole), 0.0);
 }
 
-// Bilinear, of one level. uv: place in tiles.
-float packed_linear(sampler2D from, vec2 uv, int side, float level)
+// A level that is looked up at many places: x texels a side; y, z where it begins, w 1/side of the whole.
+vec4 packed_chosen(int side, float level)
 {
 	float size = packed_size(side, level);
-	vec2 p = uv * size - 0.5;
-	vec2 base = floor(p);
-	vec2 f = p - base;
-	vec4 texel = packed_texel(from, fract((base + 0.5) / size), side, size);
+	float whole = float(side);
+	return vec4(size, size < whole ? vec2(whole, whole - 2.0 * size) : vec2(0.0), 1.0 / whole);
+}
+
+// Bilinear, of such a level. p: place in its texels.
+float packed_linear_of(sampler2D from, vec2 p, vec4 chosen)
+{
+	vec2 at = p - 0.5;
+	vec2 base = floor(at);
+	vec2 f = at - base;
+	vec2 place = fract((base + 0.5) / chosen.x) * chosen.x + vec2(chosen.y, chosen.z);
+	vec4 texel = textureLod(from, place * vec2(2.0 / 3.0, 1.0) * chosen.w, 0.0);
 	return mix(mix(texel.x, texel.y, f.x), mix(texel.z, texel.w, f.x), f.y);
+}
+
+// The same, of one place. uv: in tiles.
+float packed_linear(sampler2D from, vec2 uv, int side, float level)
+{
+	vec4 chosen = packed_chosen(side, level);
+	return packed_linear_of(from, uv * chosen.x, chosen);
 }
 
 // Cubic B-spline, of level 0.

@@ -55,11 +55,6 @@ float side_source(float up, float down)
 	return mix(through, 1.0 - through, down / max(h, 1.0));
 }
 
-// Decided when the shader is built: are pixels long strips along the layer, all (1) or some (2)? Below FIELD_ALONG_COSINE (shaders/lib/field.glsl) no sides are told.
-#ifndef FIELD_ALONG
-#define FIELD_ALONG 0
-#endif
-
 // Cloud between two heights where its top is at `top`, m.
 float side_filled(float top, float from, float to)
 {
@@ -68,7 +63,6 @@ float side_filled(float top, float from, float to)
 
 // What a view from below meets, but for detail.
 struct side_view {
-	float told;      // share that sides have: near the horizon a pixel shows a strip of the layer, in which they are not told apart
 	float thickness; // m along the vertical that hide as much
 	float above;     // m of it that are met above what is thin at the base
 	vec2 place;      // m, where what is seen begins: a place of the base, or the foot of one of a side
@@ -79,13 +73,6 @@ struct side_view {
 // place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical; rugged: by how much sides are met elsewhere, m (field_rugged).
 side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 {
-#if FIELD_ALONG == 1
-	side_view none;
-	none.told = none.thickness = none.above = none.entry = 0.0;
-	none.place = place;
-	none.clear = 1.0;
-	return none;
-#else
 	vec2 ahead = heading * (min(sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v, SIDE_SLOPE_MAX) * inversesqrt(max(dot(heading, heading), 1e-12)));
 	vec2 uv = field_place(place) / cloud_layer.z;
 	vec2 stride = ahead * (cloud_layer.y / cloud_layer.z);
@@ -126,18 +113,16 @@ side_view side_view_at(vec2 place, vec2 heading, float mu_v, vec2 rugged)
 	float left = passed.x * passed.y;
 	vec4 seen = (vec4(1.0) - passed) * vec4(1.0, passed.x, left, left * passed.z);
 	side_view view;
-	view.told = smoothstep(0.12, 0.24, mu_v);
 	view.above = above * rim;
 	view.thickness = filled.x + view.above;
 	// A rim through which the base shows, thin as that may be, is not all there is.
 	float sum = seen.x + seen.y + seen.z + seen.w;
-	seen *= view.told / (sum + SIDE_BESIDE * (1.0 - sum));
+	seen /= (sum + SIDE_BESIDE * (1.0 - sum));
 	vec4 entries = max(begins - before, vec4(0.0));
 	view.entry = dot(seen, entries);
 	view.clear = 1.0 / (1.0 + (dot(seen, entries * entries) - view.entry * view.entry) * (1.0 / (SIDE_CLEAR * SIDE_CLEAR)));
 	view.place = place + ahead * view.entry;
 	return view;
-#endif
 }
 
 // A place of the layer as it is seen from below and lit.
@@ -147,6 +132,7 @@ struct side_lit {
 	float sun;       // m along the vertical that hide as much as the beam meets
 	float smooth_m;  // thickness evened out, m
 	float light;     // light that is scattered often over that of a layer so thick
+	float upright;   // share of what is seen that shaders/lib/side_low.glsl found to stand
 };
 
 // What a beam that meets `whole` passes with detail that makes h out of `base`, m. Where a beam meets less than stands there, detail counts in proportion: added, it would leave holes.
@@ -168,26 +154,21 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 #endif
 	vec4 light = textureLod(side_light, uv, lod);
 	side_lit lit;
-	float side = 0.0;
-#if FIELD_ALONG == 1
-	lit.thickness = lit.sun = thickness;
-	lit.inside = inside;
-#else
+	lit.upright = 0.0;
 	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), 0.0);
 	thickness = mix(base, thickness, view.clear);
 	inside = mix(base, inside, view.clear);
 	// On sides detail is more or less of what is met there: added, it would end rims with an edge. A slanted way through the layer is all cloud at most.
-	side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
-	float whole = mix(base, view.thickness, view.told);
+	float side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
+	float whole = view.thickness;
 	float sided = min(side * 2.0, 1.0);
 	vec2 detail = (vec2(thickness, inside) - base) * (1.0 + SIDE_ROUGHER * sided);
 	vec2 part = vec2(whole) / (vec2(whole + 1e-3) + abs(detail));
 	vec2 met = vec2(whole) + detail * mix(vec2(1.0), part, sided);
-	met = min(max(met, vec2(0.4 * view.told * view.above)), vec2(cloud_layer.y));
+	met = min(max(met, vec2(0.4 * view.above)), vec2(cloud_layer.y));
 	lit.thickness = met.x;
 	lit.inside = met.y;
-	lit.sun = side_beam(thickness, base, mix(base, light.w, view.told));
-#endif
+	lit.sun = side_beam(thickness, base, light.w);
 	float spread = slab_light.w * lit.inside;
 	lit.smooth_m = mix(lit.inside, light.x, spread / (1.0 + spread));
 	lit.light = mix(light.y, light.z, side) / side_transmitted(lit.smooth_m);

@@ -33,6 +33,19 @@ vec2 sky_table_coordinates(vec3 direction)
 	return sky_table_at(horizon, direction.z, direction.z > horizon, cosine);
 }
 
+// Sine of the elevation of a row above the horizon, unit from 0 (horizon) to 1 (zenith).
+float sky_table_sine(float horizon, float unit)
+{
+	float from_pole = SKY_TABLE_POLE * (1.0 - unit);
+	return horizon + unit * unit / (unit * unit + from_pole * from_pole) * (1.0 - horizon);
+}
+
+// That unit, of a direction above the horizon at these coordinates.
+float sky_table_row(vec2 coordinates)
+{
+	return (coordinates.y * SKY_TABLE_SIZE.y - 0.5) / (0.5 * SKY_TABLE_SIZE.y - 1.0);
+}
+
 // The inverse, for the centre of a texel: x sine of the elevation, y cosine of the azimuth from the sun.
 vec2 sky_table_parameters(ivec2 pixel)
 {

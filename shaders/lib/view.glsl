@@ -8,7 +8,10 @@
 #include "shaders/lib/ground_near.glsl"
 #include "shaders/lib/height_sun.glsl"
 #if VIEW_CLOUDS && !VIEW_ABOVE
-#include "shaders/lib/side_light.glsl"
+#ifndef SIDE_LOW
+#define SIDE_LOW 2
+#endif
+#include "shaders/lib/side_low.glsl"
 #endif
 #if VIEW_GROUND == 2
 #include "shaders/lib/sea.glsl"
@@ -195,7 +198,7 @@ struct view_point {
 	float lit;         // share of the beam that comes there past other clouds
 	float received;    // by light that is scattered often, relative to a flat top
 	float sun;         // thickness that the beam meets, m
-	float single;      // light scattered once, relative to that of the thickness alone
+	float upright;     // share of what is seen from below that stands
 };
 
 // cos_view: cosine of the viewing direction to the local vertical, positive upwards.
@@ -270,7 +273,7 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 #endif
 	sun *= mu_l / max(mu_l, 0.01);
 #if VIEW_SOLVED
-	vec3 first = p.single * facing * sun * solved_first(p.half_angle, vec3(extinction_scaled) * thickness, m_l, m_v, through);
+	vec3 first = facing * sun * solved_first(p.half_angle, vec3(extinction_scaled) * thickness, m_l, m_v, through);
 	vec3 rest = received * sun * solved_multiple(base ? slab_light.x : 0.0, p.smooth_thickness, vec3(extinction_scaled) * (p.way * p.mu_v),
 	                                             max(mu_l, 0.01), p.mu_v, p.view_index, p.cos_azimuth);
 #if VIEW_COLOR_ONLY
@@ -318,6 +321,7 @@ void view_layer_diffuse(view_point p, vec3 sky, vec3 ground, INOUT(view_parts) p
 	parts.cloud_sky = sky * met * (vec3(1.0) - share);
 	parts.cloud_ground = ground * met * share;
 #else
+	share = mix(share, vec3(0.5), p.upright); // side_low_sky
 	parts.cloud_sky = sky * met * share;
 	parts.cloud_ground = ground * met * (vec3(1.0) - share);
 #endif
@@ -343,7 +347,7 @@ view_point view_point_at(vec3 direction, float thickness, float inside, float sm
 	p.lit = 1.0;
 	p.received = 1.0;
 	p.sun = thickness;
-	p.single = 1.0;
+	p.upright = 0.0;
 	return p;
 }
 #endif
@@ -390,6 +394,29 @@ vec3 view_air_beside(vec3 along, vec2 half_angle, float distance)
 	return (along - vec3(air_below)) * (1.0 / (1.0 + distance * distance * (aside * aside + 1.0 / (VIEW_BEAM_MIXED * VIEW_BEAM_MIXED))));
 }
 
+#if VIEW_SOLVED
+// The layer as a view meets it whose cosine to the vertical is mu_v, in the solved shading. place: where that meets the base; heading: of the view, any length.
+side_lit view_side_lit(vec2 place, vec2 heading, float mu_v, float footprint)
+{
+#if SIDE_LOW != 1
+	side_view side = side_view_at(place, heading, max(mu_v, SIDE_LOW_ALL), field_rugged(place));
+	float thickness = field_thickness(side.place, footprint);
+	side_lit lit = side_lit_at(side, footprint, thickness, thickness);
+#endif
+#if SIDE_LOW
+	side_low low = side_low_at(place, heading, mu_v, footprint);
+	side_lit low_lit = side_low_lit(low, footprint, field_thickness(low.place, footprint));
+#endif
+#if SIDE_LOW == 1
+	return low_lit;
+#elif SIDE_LOW == 2
+	return side_mixed(lit, low_lit, side_low_share(mu_v));
+#else
+	return lit;
+#endif
+}
+#endif
+
 // Upwards from below the layer.
 view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 {
@@ -399,31 +426,26 @@ view_parts view_from_below(vec3 direction, vec2 air, vec3 disc)
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	float cos_view = max(sphere_cosine(camera_position.z, direction.z, t, base), 0.01);
 	float footprint = camera_footprint(t, cos_view);
+	float mu_sun = view_sun_cosine(direction, t, base);
 #if VIEW_SOLVED
-	// The paper's model knows a plane base alone.
-	side_view side = side_view_at(place, vec2(direction), cos_view, field_rugged(place));
-	vec2 seen = side.place;
+	side_lit lit = view_side_lit(place, vec2(direction), cos_view, footprint);
+	view_point p = view_point_at(direction, lit.thickness, lit.inside, lit.smooth_m, cos_view, mu_sun);
+	p.smooth_thickness = lit.smooth_m;
+	p.sun = lit.sun;
+	p.received = lit.light;
+	p.upright = lit.upright;
+	float sine = sky_table_sine(sphere_horizon(camera_position.z), side_low_row(sky_table_row(air), lit.upright));
+	p.view_index = slab_view_index(sphere_cosine(camera_position.z, sine, sphere_distance_up(camera_position.z, sine, base), base));
 #else
-	vec2 seen = place;
-#endif
-	vec3 layer = vec3(0.0, 1.0, 0.0);
+	// The paper's model knows a plane base alone.
+	vec2 layer = vec2(view_thickness(place, footprint));
 #if VIEW_PROJECTION != 1
 	// A fisheye's footprint is as long as the strip.
 	if (cos_view < FIELD_ALONG_COSINE && cloud_layer.w > 0.5)
 		layer = field_thickness_along(place, vec2(direction), footprint, cos_view, extinction_scaled.y);
-	else
 #endif
-		layer.x = layer.z = view_thickness(seen, footprint);
-#if VIEW_SOLVED
-	side_lit lit = side_lit_at(side, footprint, layer.x, layer.z);
-	view_point p = view_point_at(direction, lit.thickness, lit.inside, lit.smooth_m, cos_view, view_sun_cosine(direction, t, base));
-	p.smooth_thickness = lit.smooth_m;
-	p.sun = lit.sun;
-	p.received = lit.light;
-#else
-	view_point p = view_point_at(direction, layer.x, layer.z, layer.z, cos_view, view_sun_cosine(direction, t, base));
+	view_point p = view_point_at(direction, layer.x, layer.y, layer.y, cos_view, mu_sun);
 #endif
-	p.single = layer.y;
 
 	vec3 to_layer = vec3(textureLod(air_to_layer, air, 0.0));
 	view_layer_sunlight(p, vec3(textureLod(air_to_end, air, 0.0)) * float(p.thickness > 0.01), parts);

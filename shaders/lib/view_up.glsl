@@ -67,18 +67,10 @@ up_ray up_ray_of(vec3 direction)
 
 // --- tables ---
 
-// Sine of the elevation of a row of a table of the sky above the horizon, unit from 0 (horizon) to 1 (zenith).
-float up_row_sine(float unit)
-{
-	float horizon = sphere_horizon(camera_position.z);
-	float from_pole = SKY_TABLE_POLE * (1.0 - unit);
-	return horizon + unit * unit / (unit * unit + from_pole * from_pole) * (1.0 - horizon);
-}
-
 // Direction of a place in a table of the sky, both coordinates from 0 to 1.
 vec3 up_direction(vec2 unit)
 {
-	float mu = up_row_sine(unit.y);
+	float mu = sky_table_sine(sphere_horizon(camera_position.z), unit.y);
 	float half_sine = unit.x * unit.x;
 	float cosine = 1.0 - 2.0 * half_sine * half_sine;
 	float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
@@ -116,10 +108,18 @@ vec3 up_first_of(vec2 unit)
 
 // --- a pixel ---
 
+// A direction of the same azimuth in that row.
+vec3 up_raised(vec3 direction, float row)
+{
+	float sine = sky_table_sine(sphere_horizon(camera_position.z), row);
+	vec2 heading = vec2(direction);
+	return vec3(heading * sqrt((1.0 - sine * sine) / max(dot(heading, heading), 1e-12)), sine);
+}
+
 // Coordinates of a direction in tables of the sky above the horizon, 0 to 1.
 vec2 up_unit(vec2 air)
 {
-	return (air * SKY_TABLE_SIZE - 0.5) / vec2(SKY_TABLE_SIZE.x - 1.0, 0.5 * SKY_TABLE_SIZE.y - 1.0);
+	return vec2((air.x * SKY_TABLE_SIZE.x - 0.5) / (SKY_TABLE_SIZE.x - 1.0), sky_table_row(air));
 }
 
 // Light as of up_light_of, and the share as of up_share_of.
@@ -155,21 +155,8 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 air = sky_table_coordinates(direction);
 	vec2 unit = up_unit(air);
 	up_ray ray = up_ray_of(direction);
-	side_view side = side_view_at(ray.place, vec2(direction), ray.mu_v, field_rugged(ray.place));
-#if FIELD_ALONG
-	vec3 layer = field_thickness_along(ray.place, vec2(direction), ray.footprint, ray.mu_v, extinction_scaled.y);
-#if FIELD_ALONG == 2
-	if (ray.mu_v >= FIELD_ALONG_COSINE)
-		layer = vec3(1.0, 0.0, 1.0) * field_thickness(side.place, ray.footprint) + vec3(0.0, 1.0, 0.0);
-#endif
-	float thickness = layer.x;
-	float inside = layer.z;
-#else
-	float thickness = field_thickness(side.place, ray.footprint);
-	float inside = thickness;
-#endif
-	side_lit lit = side_lit_at(side, ray.footprint, thickness, inside);
-	thickness = lit.thickness;
+	side_lit lit = view_side_lit(ray.place, vec2(direction), ray.mu_v, ray.footprint);
+	float thickness = lit.thickness;
 	float depth_unit = up_depth_unit(lit.smooth_m);
 
 	vec4 sky = textureLod(up_sky, air, 0.0);
@@ -184,10 +171,14 @@ vec3 up_radiance(vec3 direction, vec3 disc)
 	vec2 half_angle = scattering_half_angle(-vec3(sun_direction), -direction);
 	vec3 first = up_first_at(half_angle, solved_mean_depth(extinction_scaled.y * along_sun, tau.y / ray.mu_v)) *
 	             up_single(tau / ray.mu_v, vec3(extinction_scaled) * along_sun, along_light, along_view);
-#if FIELD_ALONG
-	first *= layer.y;
-#endif
+#if SIDE_LOW
+	// The table has the light of the place that is seen in the row, not of the one farther away.
+	unit.y = side_low_row(unit.y, lit.upright);
 	vec4 light = up_light_at(unit, depth_unit);
+	light = vec4(vec3(light) * (ray.mu_l / up_ray_of(up_raised(direction, unit.y)).mu_l), side_low_sky(light.w, lit.upright));
+#else
+	vec4 light = up_light_at(unit, depth_unit);
+#endif
 	vec3 received = vec3(textureLod(cloud_received, ray.place / cloud_layer.z, 0.0));
 	vec3 diffuse = to_layer * (vec3(sky_irradiance_cloud) * light.w + received * (1.0 - light.w)) * (1.0 / PI);
 	vec3 met = vec3(1.0) - along_view;

@@ -23,6 +23,7 @@ namespace columns_pass
 namespace spread_pass
 {
 #include "shaders/passes/side_spread.glsl"
+#include "shaders/lib/side_low.glsl"
 } // namespace spread_pass
 } // namespace glsl
 
@@ -167,11 +168,30 @@ static void an_even_layer_is_a_slab(void **)
 	}
 }
 
+/* Nor to low views. */
+static void an_even_layer_is_a_slab_to_low_views(void **)
+{
+	for (double elevation : {80., 30., 6.}) {
+		make(even, elevation, 50);
+		for (double mu : {0.33, 0.13, 0.03}) {
+			const float found = (float)even(0, 0);
+			const glsl::spread_pass::side_low view =
+				glsl::spread_pass::side_low_at(vec2(1234, 9876), vec2(0.3f, -0.8f), (float)mu, 10);
+			const glsl::spread_pass::side_lit lit = glsl::spread_pass::side_low_lit(view, 10, found);
+			assert_float_equal(lit.thickness, found, 0.1);
+			assert_float_equal(lit.sun, found, 0.1);
+			assert_float_equal(lit.smooth_m, found, 0.1);
+			assert_float_equal(lit.light, 1, 2e-3);
+			assert_float_equal(lit.upright, 0, 1e-3);
+		}
+	}
+}
+
 /* Nor of layers whose slices are thinner than what edges are made soft over. */
 static void a_thin_even_layer_is_a_slab(void **)
 {
 	for (double deep : {50., 100., 200.})
-		for (double share : {0.2, 0.5, 1.}) {
+		for (double share : {0.01, 0.05, 0.2, 0.5, 1.}) {
 			make([=](double, double) { return share * deep; }, 35, 50);
 			glsl::cloud_layer.y = (float)deep;
 			for (double mu : {0.99, 0.5, 0.13}) {
@@ -179,6 +199,12 @@ static void a_thin_even_layer_is_a_slab(void **)
 					glsl::spread_pass::side_view_at(vec2(1234, 9876), vec2(0.3f, -0.8f), (float)mu, vec2(0));
 				assert_float_equal(view.thickness, share * deep, 0.01);
 				assert_float_equal(view.entry, 0, 0.01);
+			}
+			for (double mu : {0.33, 0.13, 0.03}) {
+				const glsl::spread_pass::side_low view =
+					glsl::spread_pass::side_low_at(vec2(1234, 9876), vec2(0.3f, -0.8f), (float)mu, 10);
+				assert_float_equal(view.thickness, share * deep, 0.05);
+				assert_float_equal(view.height, 0, 0.01);
 			}
 		}
 }
@@ -254,6 +280,72 @@ static void views_meet_what_brute_force_meets(void **)
 	}
 }
 
+/* And low ones, at many: how much there is, and where what is seen begins. Cells are a kilometre wide, which a view of cosine 0.05 passes
+ * several of. */
+static void low_views_meet_what_brute_force_meets(void **)
+{
+	make(cells, 35, 120);
+	for (double mu : {0.33, 0.2, 0.1, 0.05}) {
+		const double slope = std::sqrt(1 - mu * mu) / mu;
+		double squares = 0, flat = 0, mean = 0, wanted = 0, heights = 0, height = 0;
+		int sides = 0;
+		const int count = 4000;
+		for (int i = 0; i < count; i++) {
+			const double x = tile * random_unit(), y = tile * random_unit(), a = 2 * pi * random_unit();
+			double truth = 0, seen = 0, sum = 0, begins = 0, last = -0.25;
+			for (double z = 0.25; z < deepest; z += 0.5)
+				if (cells(x + slope * std::sin(a) * z, y + slope * std::cos(a) * z) > z) {
+					const double weight = std::exp(-kappa * truth / mu);
+					begins = z - last > 0.75 ? z : begins;
+					last = z;
+					truth += 0.5;
+					seen += weight;
+					sum += weight * begins;
+				}
+			const glsl::spread_pass::side_low view = glsl::spread_pass::side_low_at(
+				vec2((float)x, (float)y), vec2((float)std::sin(a), (float)std::cos(a)), (float)mu, 10);
+			squares += std::pow(view.thickness - truth, 2) / count;
+			flat += std::pow(cells(x, y) - truth, 2) / count;
+			mean += view.thickness / count;
+			wanted += truth / count;
+			if (truth > 20) {
+				heights += std::pow(view.height - sum / seen, 2);
+				height += sum / seen;
+				sides++;
+			}
+		}
+		print_message("cosine %.2f: thickness on the view, rms %.1f m, of the place at the base alone %.1f m; mean %.1f of %.1f m; "
+			      "height seen, %.0f m at the mean, rms %.1f m\n",
+			      mu, std::sqrt(squares), std::sqrt(flat), mean, wanted, height / sides, std::sqrt(heights / sides));
+		assert_true(std::sqrt(squares) < 0.4 * std::sqrt(flat));
+		assert_true(std::fabs(mean / wanted - 1) < 0.06);
+		assert_true(std::sqrt(heights / sides) < 0.1 * deepest);
+	}
+}
+
+/* A wall that stands before the sun lets light through; one that the sun stands before sends it back, the more the lower the sun is. */
+static void low_views_see_a_lit_and_a_dark_wall(void **)
+{
+	for (double elevation : {50., 25.}) {
+		float light[2];
+		for (int behind = 0; behind < 2; behind++) {
+			make(wall, elevation, behind ? 90 : 270);
+			/* Looking east, the view enters the western side half way up. */
+			const double mu = 0.2, slope = std::sqrt(1 - mu * mu) / mu, x = 0.5 * tile - 1000 - slope * 0.45 * deepest;
+			const glsl::spread_pass::side_low view =
+				glsl::spread_pass::side_low_at(vec2((float)x, 8000), vec2(1, 0), (float)mu, 10);
+			const glsl::spread_pass::side_lit lit = glsl::spread_pass::side_low_lit(view, 10, 0.9f * (float)deepest);
+			assert_float_equal(view.height, 0.45 * deepest, 0.12 * deepest);
+			assert_float_equal(lit.upright, 1, 1e-3);
+			light[behind] = lit.light * glsl::spread_pass::side_transmitted(lit.smooth_m);
+		}
+		print_message("sun at %.0f deg: light of the wall %.2f towards the sun, %.2f away from it\n", elevation, (double)light[0],
+			      (double)light[1]);
+		assert_true(light[0] > 1.5 * light[1]);
+		assert_float_equal(light[1], glsl::spread_pass::side_transmitted(0.5f * (float)deepest), 0.25);
+	}
+}
+
 /* Of a wall the side towards the sun is bright, the one away from it dark, and a little within still more than far inside. */
 static void a_wall_has_a_bright_side(void **)
 {
@@ -305,10 +397,16 @@ static void rims_are_thin(void **)
 int main()
 {
 	const CMUnitTest tests[] = {
-		cmocka_unit_test(an_even_layer_is_a_slab),           cmocka_unit_test(a_thin_even_layer_is_a_slab),
-		cmocka_unit_test(spreading_keeps_the_mean),          cmocka_unit_test(beams_pass_what_brute_force_passes),
-		cmocka_unit_test(views_meet_what_brute_force_meets), cmocka_unit_test(rims_are_thin),
+		cmocka_unit_test(an_even_layer_is_a_slab),
+		cmocka_unit_test(a_thin_even_layer_is_a_slab),
+		cmocka_unit_test(an_even_layer_is_a_slab_to_low_views),
+		cmocka_unit_test(spreading_keeps_the_mean),
+		cmocka_unit_test(beams_pass_what_brute_force_passes),
+		cmocka_unit_test(views_meet_what_brute_force_meets),
+		cmocka_unit_test(rims_are_thin),
 		cmocka_unit_test(a_wall_has_a_bright_side),
+		cmocka_unit_test(low_views_meet_what_brute_force_meets),
+		cmocka_unit_test(low_views_see_a_lit_and_a_dark_wall),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

@@ -1,0 +1,156 @@
+// Low views from below, to which clouds stand: their sides are seen before their bases. What such a view meets is followed from the base of the layer to its top, and so is the sun's beam
+// to what is seen there. Light is that of shaders/lib/side_light.glsl, but of a side it is its own, not that of the columns around it.
+#ifndef SHADERS_LIB_SIDE_LOW
+#define SHADERS_LIB_SIDE_LOW
+#include "shaders/lib/side_light.glsl"
+
+// Cosines of the view to the vertical up to which all, and from which on nothing, is seen so; renderer/stages/view_rows.c has them too.
+const float SIDE_LOW_ALL = 0.3;
+const float SIDE_LOW_NONE = 0.34;
+
+// Decided when the shader is built: are all views low (1), some (2) or none (0)?
+#ifndef SIDE_LOW
+#define SIDE_LOW 0
+#endif
+
+// Steps along the view from the base to the top: so many at the flattest, and no more than make a step of this share of the layer's height across.
+const float SIDE_LOW_STEPS = 24.0;
+const float SIDE_LOW_STEPS_FEWEST = 7.0;
+const float SIDE_LOW_ACROSS = 0.5;
+const int SIDE_LOW_SUN_STEPS = 2;
+// Octaves by which texels of the tops are smaller than a step along the view.
+const float SIDE_LOW_SHARP = 1.0;
+// Detail, which is of the thickness, is so much more of a side.
+const float SIDE_LOW_ROUGHER = 2.0;
+// Height, of that of the layer, from which on all that is seen is side.
+const float SIDE_LOW_UPRIGHT = 0.2;
+// What is seen belongs to a cloud so thick at least, of what the view meets.
+const float SIDE_LOW_WHOLE = 0.5;
+// Share of its own light that what lies at the base has; the rest is spread sideways.
+const float SIDE_LOW_OWN = 0.2;
+// What falls on a surface as it faces the sun, of what falls on a horizontal one.
+const vec2 SIDE_LOW_FACING = vec2(0.7, 3.0);
+// Row (shaders/lib/sky_table.glsl) of views under which slabs look as sides do, which are seen more squarely than any base.
+const float SIDE_LOW_SQUARE = 0.65;
+
+// Share of what is seen so.
+float side_low_share(float mu_v)
+{
+	return 1.0 - smoothstep(SIDE_LOW_ALL, SIDE_LOW_NONE, mu_v);
+}
+
+// What a low view meets, but for detail.
+struct side_low {
+	float thickness; // m along the vertical that hide as much
+	float height;    // m over the base, where what is seen begins at the mean
+	vec2 place;      // m, of that
+};
+
+// place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical; footprint: of the pixel, m.
+side_low side_low_at(vec2 place, vec2 heading, float mu_v, float footprint)
+{
+	vec2 ahead = heading * (sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v * inversesqrt(max(dot(heading, heading), 1e-12)));
+	float steps = clamp(1.0 / (SIDE_LOW_ACROSS * mu_v), SIDE_LOW_STEPS_FEWEST, SIDE_LOW_STEPS);
+	float dz = cloud_layer.y / steps;
+	vec2 stride = ahead * (dz / cloud_layer.z);
+	float level = max(log2(max(length(stride), footprint / cloud_layer.z) * SIDE_SIZE) - SIDE_LOW_SHARP, 0.0);
+	float sharpness = extinction_scaled.y / mu_v;
+	vec4 chosen = packed_chosen(int(SIDE_SIZE), floor(level + 0.5));
+	vec2 p = field_place(place) * (chosen.x / cloud_layer.z);
+	stride *= chosen.x;
+	float from = packed_linear_of(thickness_packed, p, chosen);
+	float none = SIDE_NONE * max(1.0 - 10.0 * from / dz, 0.0);
+	float thickness = 0.0;
+	float clear = 1.0;
+	vec2 seen = vec2(0.0); // how much, and that times the height where its cloud begins
+	float begins = 0.0;
+	for (int i = 0; float(i) < steps; i++) {
+		float low = dz * float(i);
+		p += stride;
+		float to = packed_linear_of(thickness_packed, p, chosen) - low - dz;
+		// Where cloud begins above a base that is clear, the side leans out as far as it may.
+		from -= to > 0.0 ? none : 0.0;
+		none = 0.0;
+		float filled = dz * (max(from, 0.0) + max(to, 0.0)) / (abs(from) + abs(to) + 1e-3);
+		float left = clear * exp(-filled * sharpness);
+		begins = from > 0.0 ? begins : low + dz - filled;
+		seen += (clear - left) * vec2(1.0, begins);
+		clear = left;
+		thickness += filled;
+		from = to;
+	}
+	side_low view;
+	view.thickness = thickness;
+	view.height = seen.y / (seen.x + 1e-3);
+	view.place = place + ahead * view.height;
+	return view;
+}
+
+// Of a place and a height over the base. x, y: cloud on the sun's beam before and behind it, m along the vertical; z: what falls on the top there, of what falls on a horizontal one.
+vec3 side_low_beam(vec2 uv, float height)
+{
+	vec2 slope = height_sun_heading() / (height_sun_rise() * cloud_layer.z);
+	float up = (cloud_layer.y - height) / float(SIDE_LOW_SUN_STEPS);
+	float down = height / float(SIDE_LOW_SUN_STEPS);
+	vec2 passed = vec2(0.0);
+	float rises = 0.0;
+	for (int i = 0; i < SIDE_LOW_SUN_STEPS; i++) {
+		float above = up * (float(i) + 0.5);
+		float below = -down * (float(i) + 0.5);
+		float ahead = packed_linear(thickness_packed, uv + slope * above, int(SIDE_SIZE), 0.0);
+		float behind = packed_linear(thickness_packed, uv + slope * below, int(SIDE_SIZE), 0.0);
+		passed.x += clamp(ahead - height - above + 0.5 * up, 0.0, up);
+		passed.y += clamp(behind - height - below + 0.5 * down, 0.0, down);
+		rises += i == 0 ? ahead - behind : 0.0;
+	}
+	return vec3(passed, 1.0 - rises * 2.0 / (up + down));
+}
+
+// thickness: at view.place, with all detail, m.
+side_lit side_low_lit(side_low view, float footprint, float thickness)
+{
+	vec2 uv = field_place(view.place) / cloud_layer.z;
+	float level = max(log2(footprint * SIDE_SIZE / cloud_layer.z), 0.0);
+	vec4 light = textureLod(side_light, uv, level);
+	vec3 beam = side_low_beam(uv, view.height);
+	float upright = clamp(view.height / (SIDE_LOW_UPRIGHT * cloud_layer.y), 0.0, 1.0);
+	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), floor(level + 0.5));
+	float detail = (thickness - base) * mix(1.0, SIDE_LOW_ROUGHER, upright);
+	side_lit lit;
+	lit.upright = upright;
+	lit.thickness = lit.inside = clamp(view.thickness + detail * view.thickness / (view.thickness + abs(detail) + 1e-3), 0.0, cloud_layer.y);
+	lit.sun = mix(side_beam(max(base + detail, 0.0), base, light.w), max(beam.x + detail, 0.0), upright);
+	float spread = slab_light.w * lit.inside;
+	float column = mix(lit.inside, light.x, spread / (1.0 + spread));
+	lit.smooth_m = max(max(beam.x + beam.y, column), SIDE_LOW_WHOLE * min(view.thickness, cloud_layer.y));
+	float through = side_transmitted(lit.smooth_m);
+	float back = (1.0 - through) * clamp(beam.z, SIDE_LOW_FACING.x, SIDE_LOW_FACING.y);
+	float own = mix(back, through, min(beam.x / max(lit.smooth_m, 1.0), 1.0));
+	lit.light = mix(light.y, own, mix(SIDE_LOW_OWN, 1.0, upright)) / through;
+	return lit;
+}
+
+// Of a view that is low in part: `share` of b.
+side_lit side_mixed(side_lit a, side_lit b, float share)
+{
+	a.thickness = mix(a.thickness, b.thickness, share);
+	a.inside = mix(a.inside, b.inside, share);
+	a.sun = mix(a.sun, b.sun, share);
+	a.smooth_m = mix(a.smooth_m, b.smooth_m, share);
+	a.light = mix(a.light, b.light, share);
+	a.upright = mix(a.upright, b.upright, share);
+	return a;
+}
+
+// Row of the slab's light that such a place shows, of the row of the view; both from 0 (horizon) to 1 (zenith).
+float side_low_row(float row, float upright)
+{
+	return mix(row, max(row, SIDE_LOW_SQUARE), upright);
+}
+
+// Share of the sky's diffuse light in what it shows, the rest being from below: a side has half of either before it.
+float side_low_sky(float share, float upright)
+{
+	return mix(share, 0.5, upright);
+}
+#endif

@@ -29,7 +29,9 @@ const float SIDE_LOW_WHOLE = 0.5;
 // Share of its own light that what lies at the base has; the rest is spread sideways.
 const float SIDE_LOW_OWN = 0.2;
 // What falls on a surface as it faces the sun, of what falls on a horizontal one.
-const vec2 SIDE_LOW_FACING = vec2(0.7, 3.0);
+const vec2 SIDE_LOW_FACING = vec2(0.8, 2.0);
+// What is seen of a side lies inside by so much, on the sun's beam and along the vertical, m: single pixels at crests, where no cloud is before them, would glitter.
+const float SIDE_LOW_INSIDE = 6.0;
 // Row (shaders/lib/sky_table.glsl) of views under which slabs look as sides do, which are seen more squarely than any base.
 const float SIDE_LOW_SQUARE = 0.65;
 
@@ -119,7 +121,7 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	side_lit lit;
 	lit.upright = upright;
 	lit.thickness = lit.inside = clamp(view.thickness + detail * view.thickness / (view.thickness + abs(detail) + 1e-3), 0.0, cloud_layer.y);
-	lit.sun = mix(side_beam(max(base + detail, 0.0), base, light.w), max(beam.x + detail, 0.0), upright);
+	lit.sun = mix(side_beam(max(base + detail, 0.0), base, light.w), max(beam.x + detail, SIDE_LOW_INSIDE), upright);
 	float spread = slab_light.w * lit.inside;
 	float column = mix(lit.inside, light.x, spread / (1.0 + spread));
 	lit.smooth_m = max(max(beam.x + beam.y, column), SIDE_LOW_WHOLE * min(view.thickness, cloud_layer.y));

@@ -148,17 +148,26 @@ static char *walk_value(char *c, const struct place *place, int depth, struct pr
 	return *c == '{' ? walk_object(c, place, depth, problem) : walk_array(c, place, depth, problem);
 }
 
-/* What is larger than anything that is asked for here need not be taken apart: a body of a mebibyte may hold half a million zeros. Commas
- * outside of texts are counted. */
-static bool is_too_much(const char *text)
+/* What is larger than anything that is asked for here need not be taken apart: a body of a mebibyte may hold half a million zeros, or one
+ * name. Commas outside of texts are counted. */
+static bool is_too_much(const char *text, struct problem *problem)
 {
 	size_t commas = 0;
 	for (const char *c = text; *c && commas < JSON_DOCUMENT_VALUES_MAX; c++) {
-		if (*c == '"')
-			c = skip_string((char *)c) - 1;
+		if (*c == '"') {
+			const char *const end = skip_string((char *)c);
+			if (*end && end - c > JSON_DOCUMENT_TEXT_MAX) {
+				problem_add(problem, "", "has a text of more than %d bytes", JSON_DOCUMENT_TEXT_MAX);
+				return true;
+			}
+			c = end - 1;
+		}
 		commas += *c == ',';
 	}
-	return commas >= JSON_DOCUMENT_VALUES_MAX;
+	if (commas < JSON_DOCUMENT_VALUES_MAX)
+		return false;
+	problem_add(problem, "", "has more than %d members and elements in all", JSON_DOCUMENT_VALUES_MAX);
+	return true;
 }
 
 /* The parser's own words, but where they are about the parser. */
@@ -178,10 +187,8 @@ static const char *words_of(const json_error_t *error)
 json_t *json_document_parse(char *text, size_t length, struct problem *problem)
 {
 	json_error_t error;
-	if (is_too_much(text)) {
-		problem_add(problem, "", "has more than %d members and elements in all", JSON_DOCUMENT_VALUES_MAX);
+	if (is_too_much(text, problem))
 		return NULL;
-	}
 	json_t *root = json_loadb(text, length, load_flags, &error);
 	bool overflow = !root && json_error_code(&error) == json_error_numeric_overflow;
 	if (root || overflow)

@@ -304,6 +304,28 @@ static void test_nesting(void **state)
 	free(bomb);
 }
 
+/* Names and texts that nothing here is as long as are refused unread; one that does not end is no JSON. */
+static void test_long_texts(void **state)
+{
+	(void)state;
+	enum { LONG = JSON_DOCUMENT_TEXT_MAX };
+	char *body = malloc(LONG + 64);
+	for (int longer = 0; longer < 2; longer++) {
+		const int length = LONG - 2 + longer;
+		sprintf(body, "{\"%0*d\":1}", length, 0);
+		read(body);
+		assert_int_equal(problem.kind, PROBLEM_INVALID);
+		assert_int_equal(problem.error_count, 1);
+		assert_true((strstr(problem.errors[0].detail, "65536 bytes") != NULL) == (longer == 1));
+	}
+	memset(body, 'a', LONG + 32);
+	memcpy(body, "{\"", 2);
+	body[LONG + 32] = '\0';
+	read(body);
+	assert_int_equal(problem.kind, PROBLEM_NOT_JSON);
+	free(body);
+}
+
 /* Many errors are counted, not all listed; long names are cut between characters. */
 static void test_bounds_of_a_problem(void **state)
 {
@@ -351,13 +373,11 @@ static void test_presets(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_defaults),      cmocka_unit_test(test_members),
-		cmocka_unit_test(test_wrong_members), cmocka_unit_test(test_repeated_and_huge),
-		cmocka_unit_test(test_all_at_once),   cmocka_unit_test(test_across_members),
-		cmocka_unit_test(test_panoramas),     cmocka_unit_test(test_sun_by_time),
-		cmocka_unit_test(test_later),         cmocka_unit_test(test_reference),
-		cmocka_unit_test(test_maps),          cmocka_unit_test(test_not_json),
-		cmocka_unit_test(test_nesting),       cmocka_unit_test(test_bounds_of_a_problem),
+		cmocka_unit_test(test_defaults),          cmocka_unit_test(test_members),     cmocka_unit_test(test_wrong_members),
+		cmocka_unit_test(test_repeated_and_huge), cmocka_unit_test(test_all_at_once), cmocka_unit_test(test_across_members),
+		cmocka_unit_test(test_panoramas),         cmocka_unit_test(test_sun_by_time), cmocka_unit_test(test_later),
+		cmocka_unit_test(test_reference),         cmocka_unit_test(test_maps),        cmocka_unit_test(test_not_json),
+		cmocka_unit_test(test_nesting),           cmocka_unit_test(test_long_texts),  cmocka_unit_test(test_bounds_of_a_problem),
 		cmocka_unit_test(test_presets),
 	};
 	return cmocka_run_group_tests_name("scene_json", tests, NULL, forget);

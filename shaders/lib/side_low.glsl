@@ -127,16 +127,19 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	lit.smooth_m = max(max(beam.x + beam.y, column), SIDE_LOW_WHOLE * min(view.thickness, cloud_layer.y));
 	float through = side_transmitted(lit.smooth_m);
 	float back = (1.0 - through) * clamp(beam.z, SIDE_LOW_FACING.x, SIDE_LOW_FACING.y);
-	float own = mix(back, through, min(beam.x / max(lit.smooth_m, 1.0), 1.0));
+	// Where parts of several clouds are seen and the place at their mean has less cloud around it than that: as much of either end for what is not known.
+	vec2 ends = vec2(beam) / max(lit.smooth_m, 1.0);
+	float own = mix(back, through, ends.x + 0.5 * max(1.0 - ends.x - ends.y, 0.0));
 	lit.light = mix(light.y, own, mix(SIDE_LOW_OWN, 1.0, upright)) / through;
 	return lit;
 }
 
-// Of a view that is low in part: `share` of b.
+// Of a view that is low in part: `share` of b, by how much cloud either sees. Where one sees none, light is the other's.
 side_lit side_mixed(side_lit a, side_lit b, float share)
 {
-	a.thickness = mix(a.thickness, b.thickness, share);
 	a.inside = mix(a.inside, b.inside, share);
+	a.thickness = mix(a.thickness, b.thickness, share);
+	share *= b.thickness / (a.thickness + 1e-6);
 	a.sun = mix(a.sun, b.sun, share);
 	a.smooth_m = mix(a.smooth_m, b.smooth_m, share);
 	a.light = mix(a.light, b.light, share);

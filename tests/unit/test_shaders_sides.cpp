@@ -346,6 +346,53 @@ static void low_views_see_a_lit_and_a_dark_wall(void **)
 	}
 }
 
+/* Where views go over from columns to low ones: what one of them does not see lends no light to what the other sees. */
+static void what_is_not_seen_lends_no_light(void **)
+{
+	glsl::spread_pass::side_lit none = {}, seen = {};
+	none.light = 0.4f;
+	seen.thickness = seen.inside = 80;
+	seen.sun = 130;
+	seen.smooth_m = 150;
+	seen.light = 0.7f;
+	seen.upright = 1;
+	const glsl::spread_pass::side_lit mixed[2] = {glsl::spread_pass::side_mixed(none, seen, 0.1f),
+						      glsl::spread_pass::side_mixed(seen, none, 0.9f)};
+	for (const glsl::spread_pass::side_lit &lit : mixed) {
+		assert_float_equal(lit.thickness, 8, 1e-4);
+		assert_float_equal(lit.sun, seen.sun, 1e-3);
+		assert_float_equal(lit.smooth_m, seen.smooth_m, 1e-3);
+		assert_float_equal(lit.light, seen.light, 1e-5);
+		assert_float_equal(lit.upright, 1, 1e-5);
+	}
+	none.thickness = 40;
+	assert_float_equal(glsl::spread_pass::side_mixed(none, seen, 0.5f).sun, seen.sun * 80 / 120, 1e-3);
+}
+
+/* A low bank with a wall behind it, the sun at the viewer's back: at no height of the view is it dark, though the mean of what is seen lies
+ * in the gap. */
+static void low_views_see_a_bank_before_a_wall(void **)
+{
+	const auto layer = [](double x, double) {
+		return x > 4000 && x < 4600 ? 0.15 * deepest : x > 5600 && x < 9000 ? 0.9 * deepest : 0.0;
+	};
+	double least = 1e9;
+	int seen = 0;
+	make(layer, 40, 270);
+	for (double x = 3000; x < 5600; x += 5) {
+		const glsl::spread_pass::side_low view = glsl::spread_pass::side_low_at(vec2((float)x, 5000), vec2(1, 0), 0.2f, 10);
+		const double there = layer((double)view.place.x, 0);
+		const glsl::spread_pass::side_lit lit = glsl::spread_pass::side_low_lit(view, 10, (float)there);
+		if (lit.thickness < 60)
+			continue;
+		seen++;
+		least = std::fmin(least, (double)(lit.light * glsl::spread_pass::side_transmitted(lit.smooth_m)));
+	}
+	print_message("%d views of a bank before a wall: light of %.2f at least\n", seen, least);
+	assert_true(seen > 50);
+	assert_true(least > 0.35);
+}
+
 /* Of a wall the side towards the sun is bright, the one away from it dark, and a little within still more than far inside. */
 static void a_wall_has_a_bright_side(void **)
 {
@@ -407,6 +454,8 @@ int main()
 		cmocka_unit_test(a_wall_has_a_bright_side),
 		cmocka_unit_test(low_views_meet_what_brute_force_meets),
 		cmocka_unit_test(low_views_see_a_lit_and_a_dark_wall),
+		cmocka_unit_test(what_is_not_seen_lends_no_light),
+		cmocka_unit_test(low_views_see_a_bank_before_a_wall),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

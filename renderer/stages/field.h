@@ -38,7 +38,8 @@ struct field_maps {
 	const struct texture *thickness;       /* over the tile, m, in the frame of the drifting clouds, 256 texels a side */
 	const struct texture *smooth;          /* the same evened out */
 	/* Finer thickness with its maxima, the sun on it, and puffs still finer; NULL unless asked for. */
-	const struct texture *height, *light;
+	const struct texture *height;
+	const struct height_light *light;
 	const struct height_puffs *puffs;
 	/* Packed, for views from below; coarse and detail NULL at resolutions where that would be too much memory. */
 	const struct texture *coarse_packed, *detail_packed, *thickness_packed;

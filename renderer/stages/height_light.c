@@ -8,7 +8,7 @@ enum { PASS_SHADOW, PASS_RECEIVED, PASS_SOFTEN };
 static const struct pass_desc pass_descs[HEIGHT_LIGHT_PASS_COUNT] = {
 	[PASS_SHADOW] = {.file = "shaders/passes/height_shadow.glsl", .outputs = 1, .samplers = {"height_table", "shadow_below"}},
 	[PASS_RECEIVED] = {.file = "shaders/passes/height_received.glsl", .outputs = 1, .samplers = {"height_table", "shadow_table"}},
-	[PASS_SOFTEN] = {.file = "shaders/passes/height_soften.glsl", .outputs = 1, .samplers = {"height_table", "received_table"}},
+	[PASS_SOFTEN] = {.file = "shaders/passes/height_soften.glsl", .outputs = 2, .samplers = {"height_table", "received_table"}},
 };
 
 /* LIGHT_SIDE and LOWEST_SUN as in shaders/lib/height_sun.glsl. */
@@ -25,6 +25,9 @@ static const double first_step = 0.75;
  * 0.9, 1.5 and 2.35 eta at 10, 25, 50, 75 and 90 %. Two squares that give the same within a few percent: sides in eta, and the weight of
  * the short one. Under a sun at 7 degrees the distances are a tenth less. */
 static const double short_side = 1.73, long_side = 4.6, short_weight = 0.6;
+/* Light that is scattered a few times: side in mean free paths, after delta scaling. Chosen among 1 to 6 by light paths, seen towards suns
+ * at 4 to 12 degrees. */
+static const double near_side = 5;
 
 bool height_light_init(struct height_light_stage *stage, const struct pass_compiler *compiler)
 {
@@ -36,9 +39,16 @@ void height_light_finish(struct height_light_stage *stage)
 	stage_destroy_passes(stage->passes, HEIGHT_LIGHT_PASS_COUNT);
 }
 
+static void light_finish(struct height_light *light)
+{
+	texture_finish(&light->surface);
+	texture_finish(&light->near);
+}
+
 /* Tables of one computation; `light` is what remains. */
 struct tables {
-	struct texture shadow[2], received, light;
+	struct texture shadow[2], received;
+	struct height_light light;
 };
 
 static void tables_finish(struct tables *tables)
@@ -46,7 +56,7 @@ static void tables_finish(struct tables *tables)
 	texture_finish(&tables->shadow[0]);
 	texture_finish(&tables->shadow[1]);
 	texture_finish(&tables->received);
-	texture_finish(&tables->light);
+	light_finish(&tables->light);
 }
 
 static bool tables_init(struct tables *tables)
@@ -55,7 +65,8 @@ static bool tables_init(struct tables *tables)
 	return texture_init(&tables->shadow[0], LIGHT_SIDE, LIGHT_SIDE, TEXTURE_R32F, TEXTURE_REPEAT) &&
 	       texture_init(&tables->shadow[1], LIGHT_SIDE, LIGHT_SIDE, TEXTURE_R32F, TEXTURE_REPEAT) &&
 	       texture_init(&tables->received, LIGHT_SIDE, LIGHT_SIDE, TEXTURE_RGBA32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS) &&
-	       texture_init(&tables->light, LIGHT_SIDE, LIGHT_SIDE, TEXTURE_RGBA16F, TEXTURE_REPEAT | TEXTURE_MIPMAPS);
+	       texture_init(&tables->light.surface, LIGHT_SIDE, LIGHT_SIDE, TEXTURE_RGBA16F, TEXTURE_REPEAT | TEXTURE_MIPMAPS) &&
+	       texture_init(&tables->light.near, LIGHT_SIDE, LIGHT_SIDE, TEXTURE_R32F, TEXTURE_REPEAT | TEXTURE_MIPMAPS);
 }
 
 /* The shadow of all that stands within the reach of the highest top; returns which of the two tables holds it. */
@@ -87,24 +98,26 @@ static void compute(const struct height_light_stage *stage, const struct scene_b
 		 &(struct pass_run){.targets = (struct texture *[]){&tables->received}, .samplers = {height, &tables->shadow[shadow]}});
 	texture_build_mipmaps(&tables->received);
 	pass_run(stage->passes[PASS_SOFTEN],
-		 &(struct pass_run){.targets = (struct texture *[]){&tables->light},
+		 &(struct pass_run){.targets = (struct texture *[]){&tables->light.surface, &tables->light.near},
 				    .samplers = {height, &tables->received},
-				    .arguments = {{(float)(short_side * smoothing), (float)(long_side * smoothing), (float)short_weight}}});
-	texture_build_mipmaps(&tables->light);
+				    .arguments = {{(float)(short_side * smoothing), (float)(long_side * smoothing), (float)short_weight,
+						   (float)(near_side / block->extinction_scaled[1])}}});
+	texture_build_mipmaps(&tables->light.surface);
+	texture_build_mipmaps(&tables->light.near);
 }
 
-static void texture_destroy(void *value)
+static void light_destroy(void *value)
 {
-	texture_finish(value);
+	light_finish(value);
 	free(value);
 }
 
-const struct texture *height_light_get(const struct height_light_stage *stage, struct stage_context *context, const struct scene *scene,
-				       const struct texture *height)
+const struct height_light *height_light_get(const struct height_light_stage *stage, struct stage_context *context,
+					    const struct scene *scene, const struct texture *height)
 {
 	struct cache_key key = cache_key_make("height light");
 	stage_key_add_light(&key, scene);
-	struct texture *light = cache_find(context->cache, &key);
+	struct height_light *light = cache_find(context->cache, &key);
 	if (light)
 		return light;
 	context->reused = false;
@@ -117,7 +130,8 @@ const struct texture *height_light_get(const struct height_light_stage *stage, s
 	}
 	compute(stage, &context->block, height, &tables);
 	*light = tables.light;
-	tables.light = (struct texture){0};
+	tables.light = (struct height_light){0};
 	tables_finish(&tables);
-	return cache_keep(context->cache, &key, light, texture_bytes(light), texture_destroy) ? light : NULL;
+	return cache_keep(context->cache, &key, light, texture_bytes(&light->surface) + texture_bytes(&light->near), light_destroy) ? light
+																    : NULL;
 }

@@ -21,10 +21,15 @@ struct height_light_stage {
 bool height_light_init(struct height_light_stage *stage, const struct pass_compiler *compiler);
 void height_light_finish(struct height_light_stage *stage);
 
-/* height: the field's pyramid. Wants the block with sun, clouds and extinction uploaded. The table (x, y: slopes; z: height above
- * which there is no shadow, m; w: received light over that of a plane) belongs to the cache and is valid for this frame. NULL when out of
- * memory. */
-const struct texture *height_light_get(const struct height_light_stage *stage, struct stage_context *context, const struct scene *scene,
-				       const struct texture *height);
+/* surface: x, y slopes; z height above which there is no shadow, m; w light received that is scattered often, over that of a plane. near:
+ * the same of light that is scattered a few times, which comes out near where it went in. */
+struct height_light {
+	struct texture surface, near;
+};
+
+/* height: the field's pyramid. Wants the block with sun, clouds and extinction uploaded. The tables belong to the cache and are valid for
+ * this frame. NULL when out of memory. */
+const struct height_light *height_light_get(const struct height_light_stage *stage, struct stage_context *context,
+					    const struct scene *scene, const struct texture *height);
 
 #endif

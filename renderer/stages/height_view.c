@@ -13,13 +13,14 @@ enum { PIXELS_MAX = 1 << 22 };
 static struct pass *create_pass(const struct pass_compiler *compiler, const char *file, int outputs, enum projection projection, int near)
 {
 	char defines[96];
-	struct pass_desc desc = {.file = file,
-				 .defines = defines,
-				 .outputs = outputs,
-				 .samplers = {"height_table", "height_light", "smooth_table", "height_start"}};
+	struct pass_desc desc = {
+		.file = file,
+		.defines = defines,
+		.outputs = outputs,
+		.samplers = {"height_table", "height_light", "smooth_table", "height_start", "height_near_light", "phase_table"}};
 	snprintf(defines, sizeof defines, "#define VIEW_PROJECTION %d\n#define HEIGHT_NEAR %d\n", projection, near);
 	if (near)
-		memcpy(desc.samplers + 4, (const char *[]){"height_puffs", "height_puff_layers"}, 2 * sizeof(char *));
+		memcpy(desc.samplers + 6, (const char *[]){"height_puffs", "height_puff_layers"}, 2 * sizeof(char *));
 	return pass_create(compiler, &desc);
 }
 
@@ -84,7 +85,7 @@ static void run_start(const struct pass *pass, const struct field_maps *field, i
 }
 
 bool height_view_run(struct height_view_stage *stage, const struct scene *scene, const struct camera_view *view,
-		     const struct field_maps *field, int first, int end, struct height_view *seen)
+		     const struct field_maps *field, const struct texture *phase, int first, int end, struct height_view *seen)
 {
 	const int near = height_puffs_octaves(&scene->clouds);
 	if (!has_passes(stage, view->projection, near))
@@ -100,8 +101,8 @@ bool height_view_run(struct height_view_stage *stage, const struct scene *scene,
 				    .first_row = first,
 				    .height = end - first,
 				    .arguments = {{0, 0, (float)seen->first_row}},
-				    .samplers = {field->height, field->light, field->smooth, &seen->start, &field->puffs->volume,
-						 &field->puffs->layers}});
+				    .samplers = {field->height, &field->light->surface, field->smooth, &seen->start, &field->light->near,
+						 phase, &field->puffs->volume, &field->puffs->layers}});
 	return true;
 }
 

@@ -32,7 +32,7 @@ bool height_view_create(const struct scene *scene, struct height_view *seen);
 /* Renders rows [first, end) of one view of the picture, which must be among those that it holds from first_row on. Wants the whole block
  * uploaded, with that view's camera. false after log lines when a program does not compile. */
 bool height_view_run(struct height_view_stage *stage, const struct scene *scene, const struct camera_view *view,
-		     const struct field_maps *field, int first, int end, struct height_view *seen);
+		     const struct field_maps *field, const struct texture *phase, int first, int end, struct height_view *seen);
 void height_view_release(struct height_view *seen);
 
 #endif

@@ -255,7 +255,7 @@ void view_bind_inputs(struct pass_run *run, enum view_side side, const struct vi
 					  in->slab_slices,
 					  in->light->ground_received,
 					  in->light->cloud_received,
-					  above ? in->field->light : in->field->sides,
+					  above ? &in->field->light->surface : in->field->sides,
 					  above    ? (in->seen ? &in->seen->place : NULL)
 					  : packed ? in->field->coarse_packed
 						   : in->field->coarse,
@@ -374,7 +374,7 @@ static bool is_rare(const struct view_variant *variant)
 
 /* What rows [first, last) of a view see of the layer below the camera; with all: also those that only see the sky. */
 static bool see_rows(struct view_stage *stage, struct stage_context *context, const struct scene *scene, const struct camera_view *view,
-		     const struct field_maps *field, bool all, int first, int last, struct height_view *seen)
+		     const struct view_inputs *in, bool all, int first, int last, struct height_view *seen)
 {
 	bool ok = true;
 	for (int end; ok && first < last; first = end) {
@@ -383,7 +383,7 @@ static bool see_rows(struct view_stage *stage, struct stage_context *context, co
 			if (sky != (view_rows_region(&context->block, view, true, end) == VIEW_SKY))
 				break;
 		end = all ? last : end;
-		ok = sky || height_view_run(&stage->height, scene, view, field, first, end, seen);
+		ok = sky || height_view_run(&stage->height, scene, view, in->field, &in->droplets->phase, first, end, seen);
 	}
 	return ok;
 }
@@ -414,7 +414,7 @@ static bool run_view(struct view_stage *stage, struct stage_context *context, co
 			return false;
 		if (in_parts) {
 			seen->first_row = first;
-			if (!see_rows(stage, context, scene, view, inputs->field, rare, first, end, seen))
+			if (!see_rows(stage, context, scene, view, inputs, rare, first, end, seen))
 				return false;
 		}
 		run->arguments[3][2] = seen ? (float)seen->first_row : 0;
@@ -555,8 +555,7 @@ static bool see_layer(struct view_stage *stage, struct stage_context *context, c
 		const struct camera_view view = camera_view_of(scene, i);
 		view_fill_camera(&context->block, scene, &view);
 		stage_upload_block(context);
-		ok = see_rows(stage, context, scene, &view, inputs->field, is_rare(&variant), view.first_row, view.first_row + view.height,
-			      seen);
+		ok = see_rows(stage, context, scene, &view, inputs, is_rare(&variant), view.first_row, view.first_row + view.height, seen);
 	}
 	return ok;
 }

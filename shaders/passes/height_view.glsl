@@ -4,9 +4,11 @@
 #include "shaders/lib/camera.glsl"
 #include "shaders/lib/height_march.glsl"
 #include "shaders/lib/height_sun.glsl"
+#include "shaders/lib/optics.glsl"
 
 #ifndef __cplusplus
 uniform sampler2D height_start;
+uniform sampler2D height_near_light;
 #endif
 
 // Height over which shadows end, a metre of what a pixel covers.
@@ -28,12 +30,21 @@ vec2 height_slope_seen(vec2 slope, vec3 direction, float t)
 	return mu_v < HEIGHT_GRAZING ? -vec2(seen) / max(seen.z, 0.1) : slope;
 }
 
+// Share of the light from the second order on that was scattered a few times only and comes out near where it went in. The second order of a thick layer is P_2 / (4 (mu_l + mu_v)) times
+// the flux over pi, which all orders together are about once; from views towards a low sun, where that is much, the third and fourth are added to it, elsewhere none is told apart.
+float height_few(vec3 direction)
+{
+	float mu = max(sun_direction.z, 0.05) + max(-direction.z, 0.05);
+	float twice = 0.25 / mu * phase_twice(scattering_half_angle(-vec3(sun_direction), -direction)).y;
+	return twice * twice / (1.0 + twice * twice);
+}
+
 struct height_surface {
 	vec4 place; // as stored in 0, distance first
 	vec4 light; // as stored in 1
 };
 
-height_surface height_surface_at(vec3 direction, float t)
+height_surface height_surface_at(vec3 direction, float t, float few)
 {
 	vec2 place = vec2(camera_position) + vec2(direction) * t;
 	// What a pixel covers is longer than wide, which the means of squares stand for.
@@ -42,9 +53,10 @@ height_surface height_surface_at(vec3 direction, float t)
 	float shadow_edge = HEIGHT_SHADOW_SOFT * footprint;
 	vec2 drifting = field_place(place);
 	vec2 uv = drifting / cloud_layer.z;
-	vec4 light = textureLod(height_light, uv, max(log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z), 0.0));
+	float lod = max(log2(footprint * HEIGHT_SIZE_LIGHT / cloud_layer.z), 0.0);
+	vec4 light = textureLod(height_light, uv, lod);
 	vec2 slope = vec2(light);
-	float received = light.w;
+	float received = mix(light.w, textureLod(height_near_light, uv, lod).x, few);
 #if HEIGHT_NEAR
 	float scale = height_puff_scale(height);
 	vec4 puff = height_puff(drifting, height_of_ray(direction.z, t), max(footprint, HEIGHT_PUFF_FINEST));
@@ -79,9 +91,10 @@ void pass(ivec2 pixel)
 		return;
 	}
 	bool both = path.weight.y > HEIGHT_HARDLY;
-	height_surface surface = height_surface_at(direction, path.distance.x);
+	float few = height_few(direction);
+	height_surface surface = height_surface_at(direction, path.distance.x, few);
 	if (both) {
-		height_surface second = height_surface_at(direction, path.distance.y);
+		height_surface second = height_surface_at(direction, path.distance.y, few);
 		surface.place = mix(surface.place, second.place, path.weight.y / weight);
 		surface.light = mix(surface.light, second.light, path.weight.y / weight);
 	}

@@ -165,7 +165,7 @@ inline vec4 textureLod(const sampler3D &sampler, vec3 at, float lod)
 }
 
 /* Samplers of the library. */
-static sampler2D field_coarse, field_detail, ground_map, sea_sky, height_table, height_light, height_start, smooth_table;
+static sampler2D field_coarse, field_detail, ground_map, sea_sky, height_table, height_light, height_near_light, height_start, smooth_table;
 static sampler2D side_light, thickness_packed;
 static sampler2D height_below, shadow_below, shadow_table, received_table;
 static sampler2D height_puff_layers, probes, phase_table, event_table, slab_table;

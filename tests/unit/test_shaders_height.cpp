@@ -82,7 +82,7 @@ static double wall(double x, double)
 	return 0.25 * thickness + (std::fabs(x - 0.5 * tile) < 300 ? 0.7 * thickness : 0);
 }
 
-static glsl::sampler2D run_pass(void (*pass)(ivec2), int size, bool nearest = false)
+static glsl::sampler2D run_pass(void (*pass)(ivec2), int size, bool nearest = false, int output = 0)
 {
 	auto image = std::make_shared<glsl::image>();
 	image->repeat_x = image->repeat_y = true;
@@ -91,7 +91,7 @@ static glsl::sampler2D run_pass(void (*pass)(ivec2), int size, bool nearest = fa
 	for (int y = 0; y < size; y++)
 		for (int x = 0; x < size; x++) {
 			pass(ivec2(x, y));
-			image->levels[0].texels.push_back(glsl::stored[0]);
+			image->levels[0].texels.push_back(glsl::stored[output]);
 		}
 	return image;
 }
@@ -294,8 +294,9 @@ static void light_field()
 	}
 	glsl::shadow_table = glsl::shadow_below;
 	glsl::received_table = with_levels(run_pass(glsl::received::pass, LIGHT_SIDE));
-	glsl::arguments[0] = vec4(0.3 * smoothing, smoothing, 0.4, 0);
+	glsl::arguments[0] = vec4(0.3 * smoothing, smoothing, 0.4, 0.2 * smoothing);
 	glsl::height_light = run_pass(glsl::soften::pass, LIGHT_SIDE);
+	glsl::height_near_light = run_pass(glsl::soften::pass, LIGHT_SIDE, false, 1);
 }
 
 static const vec4 &light_texel(int x, int y)
@@ -357,7 +358,7 @@ static void slopes_share_the_flux_out(void **)
 			make_field(i == 0 ? std::function<double(double, double)>(billows) : cells);
 			set_sun(elevation, 200);
 			light_field();
-			double sum = 0, caught = 0, contrast = 0;
+			double sum = 0, caught = 0, contrast = 0, near_sum = 0, near_contrast = 0;
 			for (int y = 0; y < LIGHT_SIDE; y++)
 				for (int x = 0; x < LIGHT_SIDE; x++) {
 					const double share =
@@ -367,11 +368,19 @@ static void slopes_share_the_flux_out(void **)
 					sum += share * received / (LIGHT_SIDE * LIGHT_SIDE);
 					caught += share / (LIGHT_SIDE * LIGHT_SIDE);
 					contrast += share * std::pow(received - 1, 2) / (LIGHT_SIDE * LIGHT_SIDE);
+					const double near =
+						(double)glsl::height_near_light->levels[0].texels[(size_t)y * LIGHT_SIDE + (size_t)x].x;
+					assert_true(std::isfinite(near) && near >= 0);
+					near_sum += share * near / (LIGHT_SIDE * LIGHT_SIDE);
+					near_contrast += share * std::pow(near - 1, 2) / (LIGHT_SIDE * LIGHT_SIDE);
 				}
 			mean[i] = sum;
 			columns = caught;
 			print_message("sun at %2.0f deg, %s: flux caught %.4f, by columns alone %.4f; it varies by %.0f %%\n", elevation,
 				      i == 0 ? "deck" : "cells", sum, caught, 100 * std::sqrt(contrast / caught));
+			/* Light that keeps near is no more, but varies more. */
+			assert_true(std::fabs(near_sum / sum - 1) < 0.03);
+			assert_true(near_contrast > contrast);
 			if (i == 0)
 				assert_true(std::fabs(sum / caught - 1) < 0.03);
 		}

@@ -328,7 +328,8 @@ static void copy_textures(const made &out)
 	glsl::field_coarse = copy_of(out.field.coarse_packed ? out.field.coarse_packed : out.field.coarse);
 	glsl::field_detail = copy_of(out.field.detail_packed ? out.field.detail_packed : out.field.detail);
 	glsl::height_table = copy_of(out.field.height);
-	glsl::height_light = copy_of(out.field.light);
+	glsl::height_light = copy_of(out.field.light ? &out.field.light->surface : nullptr);
+	glsl::height_near_light = copy_of(out.field.light ? &out.field.light->near : nullptr);
 	glsl::height_puff_layers = copy_of(out.field.puffs ? &out.field.puffs->layers : nullptr);
 	glsl::height_puffs = copy_of_volume(out.field.puffs ? &out.field.puffs->volume : nullptr);
 	glsl::smooth_table = copy_of(out.field.smooth);

@@ -3,6 +3,9 @@
 #include <math.h>
 #include <string.h>
 
+/* As long as the daemon's names get; another server's may be longer. */
+enum { NAME_MAX_WIDTH = 32 };
+
 /* NaN for null and what is missing. */
 static double number(const json_t *object, const char *name)
 {
@@ -32,11 +35,27 @@ static const char *text(const json_t *object, const char *name)
 	return value ? value : "";
 }
 
-static void print_line(FILE *to, const json_t *region, const json_t *variant)
+/* Of the longest name that is printed, so that columns stand below their heads. */
+static int name_width(const json_t *named, const char *but, size_t least)
+{
+	size_t width = least, i;
+	json_t *one;
+	json_array_foreach((json_t *)named, i, one)
+	{
+		const char *name = text(one, "name");
+		const size_t length = strlen(name);
+		if (strcmp(name, but) != 0 && length > width)
+			width = length < NAME_MAX_WIDTH ? length : NAME_MAX_WIDTH;
+	}
+	return (int)width;
+}
+
+static void print_line(FILE *to, const json_t *region, const json_t *variant, const int widths[static 2])
 {
 	const json_t *figures = json_object_get(json_object_get(variant, "regions"), text(region, "name"));
 	const json_t *flip = json_object_get(figures, "flip");
-	fprintf(to, "%-10.32s %9.0f  %-12.32s", text(region, "name"), number(region, "pixels"), text(variant, "name"));
+	fprintf(to, "%-*.*s %9.0f  %-*.*s", widths[0], NAME_MAX_WIDTH, text(region, "name"), number(region, "pixels"), widths[1],
+		NAME_MAX_WIDTH, text(variant, "name"));
 	print_share(to, number(figures, "bias"));
 	print_share(to, number(figures, "bias_standard_error"));
 	print_share(to, number(figures, "rms"));
@@ -67,9 +86,10 @@ bool compare_table_print(FILE *to, const json_t *comparison)
 		return false;
 	fprintf(to, "against %s, %.0f x %.0f\n", truth, number(comparison, "width"), number(comparison, "height"));
 	json_array_foreach(variants, v, variant) print_samples(to, variant);
-	fprintf(to, "%-10s %9s  %-12s %8s %8s %8s %8s %8s %8s %8s %8s\n", "region", "pixels", "variant", "bias %", "+- %", "rms %",
-		"noise %", "less it", "+- %", "FLIP", "largest");
+	const int widths[] = {name_width(regions, "", 10), name_width(variants, truth, 12)};
+	fprintf(to, "%-*s %9s  %-*s %8s %8s %8s %8s %8s %8s %8s %8s\n", widths[0], "region", "pixels", widths[1], "variant", "bias %",
+		"+- %", "rms %", "noise %", "less it", "+- %", "FLIP", "largest");
 	json_array_foreach(regions, r, region) json_array_foreach(variants, v, variant) if (strcmp(text(variant, "name"), truth) != 0)
-		print_line(to, region, variant);
+		print_line(to, region, variant, widths);
 	return true;
 }

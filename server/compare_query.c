@@ -55,14 +55,25 @@ void compare_query_pointer(const json_t *root, int variant, const char *member, 
 		snprintf(pointer, size, "/scene%s", member);
 }
 
-void compare_query_add(const json_t *root, int variant, const struct problem *of_scene, struct problem *problem)
+/* `alone`: what is wrong with the scene without variants, or NULL where that is not known. */
+static void add_errors(const json_t *root, int variant, const struct problem *of_scene, const struct problem *alone,
+		       struct problem *problem)
 {
 	for (size_t i = 0; i < of_scene->error_count && i < PROBLEM_ERRORS_MAX; i++) {
 		const struct problem_error *error = &of_scene->errors[i];
+		const char *member = error->pointer ? error->pointer : "", *detail = error->detail ? error->detail : "is wrong";
 		char pointer[POINTER_SIZE];
-		compare_query_pointer(root, variant, error->pointer ? error->pointer : "", pointer, sizeof pointer);
-		problem_add(problem, pointer, "%s", error->detail ? error->detail : "is wrong");
+		compare_query_pointer(root, variant, member, pointer, sizeof pointer);
+		if (alone && strncmp(pointer, "/scene", strlen("/scene")) == 0 && !problem_mentions(alone, member))
+			problem_add(problem, pointer, "%s, with what /variants/%d changes", detail, variant);
+		else
+			problem_add(problem, pointer, "%s", detail);
 	}
+}
+
+void compare_query_add(const json_t *root, int variant, const struct problem *of_scene, struct problem *problem)
+{
+	add_errors(root, variant, of_scene, NULL, problem);
 	if (of_scene->kind != PROBLEM_NONE && of_scene->kind != PROBLEM_INVALID)
 		problem_set(problem, of_scene->kind, "%s", of_scene->detail);
 }
@@ -182,20 +193,34 @@ static void set_layers(struct scene *scene)
 		scene->output.layers |= 1u << LAYER_STANDARD_ERROR;
 }
 
-static void read_scene(const json_t *root, int index, const json_t *patch, struct compare_query *query, struct problem *problem)
+/* The scene with a patch laid over it. */
+static void read_scene(const json_t *root, const json_t *patch, struct scene_input *input, struct problem *own)
 {
-	struct problem own = {0};
-	struct scene_input *input = &query->variant[index].input;
 	const json_t *base = json_object_get(root, "scene");
 	json_t *scene = merge_patch(base ? json_deep_copy(base) : json_object(), patch);
 	*input = scene_input_default();
 	json_object_del(scene, "name"); /* the variant's */
-	scene_json_read(scene, input, &own);
+	scene_json_read(scene, input, own);
 	set_layers(&input->scene);
-	scene_rules_apply(input, &own);
-	compare_query_add(root, index, &own, problem);
-	problem_finish(&own);
+	scene_rules_apply(input, own);
 	json_decref(scene);
+}
+
+/* Where something is wrong, tells whether the variant made it so. */
+static void read_variant_scene(const json_t *root, int index, const json_t *patch, struct compare_query *query, struct problem *problem)
+{
+	struct problem own = {0}, alone = {0};
+	struct scene_input unchanged;
+	json_t *nothing = json_object();
+	read_scene(root, patch, &query->variant[index].input, &own);
+	if (own.error_count > 0)
+		read_scene(root, nothing, &unchanged, &alone);
+	add_errors(root, index, &own, &alone, problem);
+	if (own.kind != PROBLEM_NONE && own.kind != PROBLEM_INVALID)
+		problem_set(problem, own.kind, "%s", own.detail);
+	json_decref(nothing);
+	problem_finish(&alone);
+	problem_finish(&own);
 }
 
 /* A null takes a member away before the scene is read, so that only here it is seen to be none. */
@@ -229,7 +254,7 @@ static void read_variant(const json_t *root, int index, struct compare_query *qu
 		problem_add(problem, pointer, "must be an object");
 		return;
 	}
-	read_scene(root, index, patch, query, problem);
+	read_variant_scene(root, index, patch, query, problem);
 	check_nulls(patch, index, problem);
 	snprintf(pointer, sizeof pointer, "/variants/%d/output", index);
 	if (json_object_get(patch, "output"))

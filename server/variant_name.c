@@ -4,10 +4,12 @@
 #include <stdio.h>
 #include <string.h>
 
-/* What the name was cut from may be longer. */
+/* Members are left out whole where there is no room for them. */
 struct draft {
 	char text[128];
 	size_t length; /* that it would have */
+	size_t room;   /* for members, in characters */
+	int left_out;  /* so many of them */
 };
 
 static void add_word(struct draft *draft, char separator, const char *word)
@@ -38,30 +40,37 @@ static void add_value(struct draft *draft, const json_t *value)
 	}
 }
 
+/* The first is there in any case, be it cut. */
+static void add_member(struct draft *draft, const char *section, const char *name, const json_t *value)
+{
+	const size_t before = draft->length;
+	if (section)
+		add_word(draft, '-', section);
+	add_word(draft, '-', name);
+	add_value(draft, value);
+	if (before > 0 && draft->length > draft->room) {
+		draft->length = before;
+		draft->left_out++;
+	}
+}
+
 static void add_section(struct draft *draft, const char *section, const json_t *members, bool with_sections)
 {
 	const char *name;
 	json_t *value;
-	if (!json_is_object(members)) {
-		add_word(draft, '-', section);
-		add_value(draft, members);
-	}
-	json_object_foreach((json_t *)members, name, value)
-	{
-		if (with_sections)
-			add_word(draft, '-', section);
-		add_word(draft, '-', name);
-		add_value(draft, value);
-	}
+	if (!json_is_object(members))
+		add_member(draft, NULL, section, members);
+	json_object_foreach((json_t *)members, name, value) add_member(draft, with_sections ? section : NULL, name, value);
 }
 
-static void write_draft(struct draft *draft, const json_t *patch, bool with_sections)
+static void write_draft(struct draft *draft, const json_t *patch, bool with_sections, size_t room)
 {
 	const char *section;
 	json_t *members;
-	*draft = (struct draft){0};
+	*draft = (struct draft){.room = room};
 	json_object_foreach((json_t *)patch, section, members) if (strcmp(section, "name") != 0)
 		add_section(draft, section, members, with_sections);
+	draft->text[draft->length < sizeof draft->text ? draft->length : sizeof draft->text - 1] = '\0';
 }
 
 bool variant_changes_only_model(const json_t *patch)
@@ -75,9 +84,15 @@ bool variant_changes_only_model(const json_t *patch)
 
 void variant_name_of_patch(const json_t *patch, char *name, size_t size)
 {
+	static const char tail[] = "-and-99-more";
 	struct draft draft;
-	write_draft(&draft, patch, true);
-	if (draft.length >= size)
-		write_draft(&draft, patch, false);
-	snprintf(name, size, "%s", draft.text);
+	write_draft(&draft, patch, true, size - 1);
+	if (draft.left_out || draft.length >= size)
+		write_draft(&draft, patch, false, size - 1);
+	if (draft.left_out)
+		write_draft(&draft, patch, false, size - sizeof tail);
+	if (draft.left_out)
+		snprintf(name, size, "%.*s-and-%d-more", (int)(size - sizeof tail), draft.text, draft.left_out);
+	else
+		snprintf(name, size, "%s", draft.text);
 }

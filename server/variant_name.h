@@ -10,7 +10,8 @@
 bool variant_changes_only_model(const json_t *patch);
 
 /* The members that a patch sets and their values, "radiosity-enabled-false", in letters, digits, '-' and '_'; without the names of sections
- * where it would not fit (size, with the NUL), cut where it does not even so. "" when the patch changes nothing. */
+ * where it would not fit (size, with the NUL); what does not even so is left out whole, "coverage-0_4-seed-5-and-2-more". "" when the patch
+ * changes nothing. */
 void variant_name_of_patch(const json_t *patch, char *name, size_t size);
 
 #endif

@@ -202,6 +202,9 @@ def test_variants_are_merge_patches(daemon):
     ([{}, {"clouds": {"coverage": 0.55}}, {"clouds": {"coverage": 0.4}, "ground": {"type": "snow"}}],
      ["solved", "clouds-coverage-0_55", "coverage-0_4-type-snow"]),
     ([{"name": "paper"}, {"model": {"shading": "paper"}}, {}], ["paper", "model-shading-paper", "solved"]),
+    ([{}, {"clouds": {"type": "altocumulus", "coverage": 0.4, "thickness_m": 200, "seed": 5}}], ["solved", "type-altocumulus-and-3-more"]),
+    ([{}, {"clouds": {"coverage": 0.4, "seed": 5}, "ground": {"type": "snow"}, "radiosity": {"enabled": False}}],
+     ["solved", "coverage-0_4-seed-5-and-2-more"]),
     ([{"camera": {"position_m": [0, 0, 300.5]}}, {"sun": None}, {"sun": None}], ["camera-position_m-0-0-300_5", "sun-default", "sun-default-2"]),
 ])
 def test_variants_are_named_by_what_they_change(daemon, variants, names):
@@ -307,6 +310,16 @@ def test_refusals_name_their_place(daemon, body, pointers):
     assert answer.status == 422 and answer.headers["Content-Type"] == "application/problem+json"
     assert answer.pointers == pointers
     assert daemon.metric('stratus_stage_duration_seconds_count{stage="view"}') == before
+
+
+def test_refusals_tell_whose_doing_they_are(daemon):
+    """A member of the scene that is wrong only with what a variant changes is no fault of the scene's."""
+    scene = {"camera": {"position_m": [0, 0, 300]}}
+    by_variant = compare(daemon, {"scene": scene, "variants": [{}, {"clouds": {"base_m": 200}}]}).json["errors"]
+    assert [error["pointer"] for error in by_variant] == ["/scene/camera/position_m/2"]
+    assert by_variant[0]["detail"].endswith(", with what /variants/1 changes")
+    by_scene = compare(daemon, {"scene": {**scene, "clouds": {"base_m": 200}}, "variants": [{}, {"model": {"shading": "paper"}}]}).json["errors"]
+    assert [error["pointer"] for error in by_scene] == ["/scene/camera/position_m/2"] and "/variants/" not in by_scene[0]["detail"]
 
 
 def test_other_refusals(daemon):

@@ -1,16 +1,20 @@
 /* Measures what the bounds of docs/validation/README.md judge, and writes that page and the data of its figures.
  *
  * stratus-validate [--kernel FILE] [--effort 0.01..1] [--only PART] FOLDER
- * The page goes to FOLDER/README.md, data beside it. Exit status 0: no bound is broken, 1: one is, 2: it could not be measured.
+ * The page goes to FOLDER/README.md, data beside it; the folder is made unless it is there. Exit status 0: no bound is broken, 1: one is,
+ * 2: it could not be measured.
  */
 #include "tests/validate/validate.h"
 
 #include "renderer/log.h"
 
+#include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
+#include <unistd.h>
 
 void require(bool holds, const char *what)
 {
@@ -79,6 +83,13 @@ FILE *figure_file(const struct validation *validation, const char *name)
 	FILE *file = fopen(path, "w");
 	require(file, "cannot write the figures' data");
 	return file;
+}
+
+/* Before hours of work are spent on what could not be written. */
+static void require_folder(const struct validation *validation)
+{
+	const bool made = mkdir(validation->folder, 0777) == 0 || errno == EEXIST;
+	require(made && access(validation->folder, W_OK | X_OK) == 0, "the folder cannot be written to");
 }
 
 /* --- the run ------------------------------------------------------------------------------------------------------------------- */
@@ -181,6 +192,7 @@ int main(int argc, char **argv)
 	static struct validation validation = {.effort = 1};
 	const char *kernel = "build/mie.kernel";
 	require(parse(&validation, &kernel, argc, argv), "usage: stratus-validate [--kernel FILE] [--effort 0.01..1] [--only PART] FOLDER");
+	require_folder(&validation);
 	log_set_level(LOG_ERROR);
 	validation.measured.of_one_part = validation.only;
 	validation.kernel = kernel_load(kernel);

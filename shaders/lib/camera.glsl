@@ -40,6 +40,12 @@ float camera_footprint(float distance, float cosine)
 #endif
 }
 
+// Length of the strip of such a footprint, m.
+float camera_strip(float footprint, float cosine)
+{
+	return VIEW_PROJECTION == 1 ? footprint : footprint * inversesqrt(cosine);
+}
+
 // Is there a picture at all? Not beyond the fisheye's circle.
 bool camera_shows(vec2 at)
 {

@@ -2,6 +2,7 @@
 // to what is seen there. Light is that of shaders/lib/side_light.glsl, but of a side it is its own, not that of the columns around it.
 #ifndef SHADERS_LIB_SIDE_LOW
 #define SHADERS_LIB_SIDE_LOW
+#include "shaders/lib/camera.glsl"
 #include "shaders/lib/side_light.glsl"
 
 // Cosines of the view to the vertical up to which all, and from which on nothing, is seen so; renderer/stages/view_rows.c has them too.
@@ -32,6 +33,8 @@ const float SIDE_LOW_OWN = 0.2;
 const vec2 SIDE_LOW_FACING = vec2(0.8, 2.0);
 // What is seen of a side lies inside by so much, on the sun's beam and along the vertical, m: single pixels at crests, where no cloud is before them, would glitter.
 const float SIDE_LOW_INSIDE = 6.0;
+// Within a pixel, heights that differ by more than up to twice as much are those of different clouds, m.
+const float SIDE_LOW_APART = 20.0;
 // Row (shaders/lib/sky_table.glsl) of views under which slabs look as sides do, which are seen more squarely than any base.
 const float SIDE_LOW_SQUARE = 0.65;
 
@@ -41,50 +44,69 @@ float side_low_share(float mu_v)
 	return 1.0 - smoothstep(SIDE_LOW_ALL, SIDE_LOW_NONE, mu_v);
 }
 
-// What a low view meets, but for detail.
+// What a low view meets, but for detail. A pixel covers a long strip of the layer, in which edges are passed: it is two views, of its lower and its upper half.
 struct side_low {
-	float thickness; // m along the vertical that hide as much
-	float height;    // m over the base, where what is seen begins at the mean
+	vec2 thickness; // m along the vertical that hide as much, of either
+	float sharpness; // extinction along the view per m of it
+	float height;    // m over the base, where the cloud begins of which most is seen: the mean of several may lie in none
 	vec2 place;      // m, of that
 };
+
+// Tops at two places so far apart, in texels of a level.
+vec2 side_low_tops(vec2 p, vec2 apart, vec4 chosen)
+{
+	return vec2(packed_linear_of(thickness_packed, p, chosen), packed_linear_of(thickness_packed, p + apart, chosen));
+}
 
 // place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical; footprint: of the pixel, m.
 side_low side_low_at(vec2 place, vec2 heading, float mu_v, float footprint)
 {
-	vec2 ahead = heading * (sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v * inversesqrt(max(dot(heading, heading), 1e-12)));
+	vec2 flat_view = heading * inversesqrt(max(dot(heading, heading), 1e-12));
+	vec2 ahead = flat_view * (sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v);
+	float strip = camera_strip(footprint, mu_v);
 	float steps = clamp(1.0 / (SIDE_LOW_ACROSS * mu_v), SIDE_LOW_STEPS_FEWEST, SIDE_LOW_STEPS);
 	float dz = cloud_layer.y / steps;
 	vec2 stride = ahead * (dz / cloud_layer.z);
 	float level = max(log2(max(length(stride), footprint / cloud_layer.z) * SIDE_SIZE) - SIDE_LOW_SHARP, 0.0);
 	float sharpness = extinction_scaled.y / mu_v;
 	vec4 chosen = packed_chosen(int(SIDE_SIZE), floor(level + 0.5));
-	vec2 p = field_place(place) * (chosen.x / cloud_layer.z);
+	float texels = chosen.x / cloud_layer.z;
+	vec2 aside = flat_view * (0.5 * strip * texels);
+	vec2 p = field_place(place) * texels - 0.5 * aside;
 	stride *= chosen.x;
-	float from = packed_linear_of(thickness_packed, p, chosen);
-	float none = SIDE_NONE * max(1.0 - 10.0 * from / dz, 0.0);
-	float thickness = 0.0;
-	float clear = 1.0;
-	vec2 seen = vec2(0.0); // how much, and that times the height where its cloud begins
-	float begins = 0.0;
+	vec2 from = side_low_tops(p, aside, chosen);
+	vec2 none = SIDE_NONE * max(vec2(1.0) - 10.0 * from / dz, vec2(0.0));
+	vec2 thickness = vec2(0.0);
+	vec2 clear = vec2(1.0);
+	vec2 begins = vec2(0.0);
+	vec2 part = vec2(0.0); // seen of the cloud that begins there
+	vec2 most = vec2(0.0);
+	vec2 height = vec2(0.0); // where the cloud begins of which most is seen
 	for (int i = 0; float(i) < steps; i++) {
 		float low = dz * float(i);
 		p += stride;
-		float to = packed_linear_of(thickness_packed, p, chosen) - low - dz;
+		vec2 to = side_low_tops(p, aside, chosen) - (low + dz);
 		// Where cloud begins above a base that is clear, the side leans out as far as it may.
-		from -= to > 0.0 ? none : 0.0;
-		none = 0.0;
-		float filled = dz * (max(from, 0.0) + max(to, 0.0)) / (abs(from) + abs(to) + 1e-3);
-		float left = clear * exp(-filled * sharpness);
-		begins = from > 0.0 ? begins : low + dz - filled;
-		seen += (clear - left) * vec2(1.0, begins);
+		from -= mix(vec2(0.0), none, greaterThan(to, vec2(0.0)));
+		none = vec2(0.0);
+		vec2 filled = dz * (max(from, vec2(0.0)) + max(to, vec2(0.0))) / (abs(from) + abs(to) + 1e-3);
+		vec2 left = clear * exp(-filled * sharpness);
+		begins = mix(low + dz - filled, begins, greaterThan(from, vec2(0.0)));
+		part = clear - left + mix(vec2(0.0), part, greaterThan(from, vec2(0.0)));
+		height = mix(height, begins, greaterThan(part, most));
+		most = max(most, part);
 		clear = left;
 		thickness += filled;
 		from = to;
 	}
 	side_low view;
 	view.thickness = thickness;
-	view.height = seen.y / (seen.x + 1e-3);
-	view.place = place + ahead * view.height;
+	view.sharpness = sharpness;
+	// Of both, but of one where these are places of two clouds.
+	float upper = most.y / (most.x + most.y + 1e-6);
+	upper = mix(upper, step(0.5, upper), clamp(abs(height.x - height.y) / SIDE_LOW_APART - 1.0, 0.0, 1.0));
+	view.height = mix(height.x, height.y, upper);
+	view.place = place + ahead * view.height + flat_view * ((upper - 0.5) * 0.5 * strip);
 	return view;
 }
 
@@ -120,11 +142,15 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	float detail = (thickness - base) * mix(1.0, SIDE_LOW_ROUGHER, upright);
 	side_lit lit;
 	lit.upright = upright;
-	lit.thickness = lit.inside = clamp(view.thickness + detail * view.thickness / (view.thickness + abs(detail) + 1e-3), 0.0, cloud_layer.y);
+	vec2 met = clamp(view.thickness + detail * view.thickness / (view.thickness + abs(detail) + 1e-3), vec2(0.0), vec2(cloud_layer.y));
+	// What lets through as much as both do at the mean, and what there is where cloud is.
+	lit.thickness = min(met.x, met.y) - log(0.5 + 0.5 * exp(-abs(met.x - met.y) * view.sharpness)) / view.sharpness;
+	vec2 hidden = vec2(1.0) - exp(-met * view.sharpness);
+	lit.inside = dot(met, hidden) / max(hidden.x + hidden.y, 1e-3);
 	lit.sun = mix(side_beam(max(base + detail, 0.0), base, light.w), max(beam.x + detail, SIDE_LOW_INSIDE), upright);
 	float spread = slab_light.w * lit.inside;
 	float column = mix(lit.inside, light.x, spread / (1.0 + spread));
-	lit.smooth_m = max(max(beam.x + beam.y, column), SIDE_LOW_WHOLE * min(view.thickness, cloud_layer.y));
+	lit.smooth_m = max(max(beam.x + beam.y, column), SIDE_LOW_WHOLE * min(max(view.thickness.x, view.thickness.y), cloud_layer.y));
 	float through = side_transmitted(lit.smooth_m);
 	float back = (1.0 - through) * clamp(beam.z, SIDE_LOW_FACING.x, SIDE_LOW_FACING.y);
 	// Where parts of several clouds are seen and the place at their mean has less cloud around it than that: as much of either end for what is not known.

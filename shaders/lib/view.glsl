@@ -405,7 +405,8 @@ side_lit view_side_lit(vec2 place, vec2 heading, float mu_v, float footprint)
 #endif
 #if SIDE_LOW
 	side_low low = side_low_at(place, heading, mu_v, footprint);
-	side_lit low_lit = side_low_lit(low, footprint, field_thickness(low.place, footprint));
+	// One place stands for both halves of a pixel: detail finer than half way from its square to its strip would come out as dots.
+	side_lit low_lit = side_low_lit(low, footprint, field_thickness(low.place, sqrt(footprint * camera_strip(footprint, mu_v))));
 #endif
 #if SIDE_LOW == 1
 	return low_lit;

@@ -14,10 +14,9 @@ const float SIDE_LOW_NONE = 0.34;
 #define SIDE_LOW 0
 #endif
 
-// Steps along the view from the base to the top: so many at the flattest, and no more than make a step of this share of the layer's height across.
+// Steps along the view from the base to the top are this share of the layer's height across, and so often twice as long that there are about so many.
+const float SIDE_LOW_ACROSS = 0.4;
 const float SIDE_LOW_STEPS = 24.0;
-const float SIDE_LOW_STEPS_FEWEST = 7.0;
-const float SIDE_LOW_ACROSS = 0.5;
 const int SIDE_LOW_SUN_STEPS = 2;
 // Octaves by which texels of the tops are smaller than a step along the view.
 const float SIDE_LOW_SHARP = 1.0;
@@ -29,8 +28,12 @@ const float SIDE_LOW_UPRIGHT = 0.2;
 const float SIDE_LOW_WHOLE = 0.5;
 // Share of its own light that what lies at the base has; the rest is spread sideways.
 const float SIDE_LOW_OWN = 0.2;
+// A lit side sends back what the cloud behind it does, not what lies right below it alone: so much of how thick that is so far behind, in shares of the layer's height.
+const float SIDE_LOW_BEHIND = 0.7;
+const float SIDE_LOW_BEHIND_FAR = 0.5;
+const float SIDE_LOW_BEHIND_WIDE = 0.3; // over which that is a mean
 // What falls on a surface as it faces the sun, of what falls on a horizontal one.
-const vec2 SIDE_LOW_FACING = vec2(0.8, 2.0);
+const vec2 SIDE_LOW_FACING = vec2(0.8, 1.6);
 // What is seen of a side lies inside by so much, on the sun's beam and along the vertical, m: single pixels at crests, where no cloud is before them, would glitter.
 const float SIDE_LOW_INSIDE = 6.0;
 // Within a pixel, heights that differ by more than up to twice as much are those of different clouds, m.
@@ -52,52 +55,53 @@ struct side_low {
 	vec2 place;      // m, of that
 };
 
-// Tops at two places so far apart, in texels of a level.
-vec2 side_low_tops(vec2 p, vec2 apart, vec4 chosen)
-{
-	return vec2(packed_linear_of(thickness_packed, p, chosen), packed_linear_of(thickness_packed, p + apart, chosen));
-}
-
 // place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical; footprint: of the pixel, m.
 side_low side_low_at(vec2 place, vec2 heading, float mu_v, float footprint)
 {
 	vec2 flat_view = heading * inversesqrt(max(dot(heading, heading), 1e-12));
-	vec2 ahead = flat_view * (sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v);
 	float strip = camera_strip(footprint, mu_v);
-	float steps = clamp(1.0 / (SIDE_LOW_ACROSS * mu_v), SIDE_LOW_STEPS_FEWEST, SIDE_LOW_STEPS);
-	float dz = cloud_layer.y / steps;
-	vec2 stride = ahead * (dz / cloud_layer.z);
-	float level = max(log2(max(length(stride), footprint / cloud_layer.z) * SIDE_SIZE) - SIDE_LOW_SHARP, 0.0);
+	// Steeper views are none of these, but are followed before that is known.
+	float slope = max(sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v, 1.0);
+	// Steps end at distances that are the same for neighbouring pixels: a crest that one of them looks at all look at, and none sees it pass between two steps.
+	float stride = SIDE_LOW_ACROSS * cloud_layer.y * exp2(max(floor(log2(slope / (SIDE_LOW_ACROSS * SIDE_LOW_STEPS)) + 0.5), 0.0));
+	vec2 base = vec2(dot(place - vec2(camera_position), flat_view)) + vec2(-0.25, 0.25) * strip;
+	vec2 next = (floor(base / stride) + 1.0) * stride - base;
+	float level = max(log2(max(stride, footprint) * SIDE_SIZE / cloud_layer.z) - SIDE_LOW_SHARP, 0.0);
 	float sharpness = extinction_scaled.y / mu_v;
 	vec4 chosen = packed_chosen(int(SIDE_SIZE), floor(level + 0.5));
 	float texels = chosen.x / cloud_layer.z;
-	vec2 aside = flat_view * (0.5 * strip * texels);
-	vec2 p = field_place(place) * texels - 0.5 * aside;
-	stride *= chosen.x;
-	vec2 from = side_low_tops(p, aside, chosen);
-	vec2 none = SIDE_NONE * max(vec2(1.0) - 10.0 * from / dz, vec2(0.0));
+	vec2 ahead = flat_view * texels;
+	vec2 p = field_place(place) * texels - ahead * (0.25 * strip);
+	vec2 q = p + ahead * (0.5 * strip);
+	vec2 from = vec2(packed_linear_of(thickness_packed, p, chosen), packed_linear_of(thickness_packed, q, chosen));
+	vec2 none = SIDE_NONE * max(vec2(1.0) - 10.0 * slope / stride * from, vec2(0.0));
 	vec2 thickness = vec2(0.0);
 	vec2 clear = vec2(1.0);
 	vec2 begins = vec2(0.0);
 	vec2 part = vec2(0.0); // seen of the cloud that begins there
 	vec2 most = vec2(0.0);
 	vec2 height = vec2(0.0); // where the cloud begins of which most is seen
-	for (int i = 0; float(i) < steps; i++) {
-		float low = dz * float(i);
-		p += stride;
-		vec2 to = side_low_tops(p, aside, chosen) - (low + dz);
+	vec2 z = vec2(0.0);
+	vec2 dz = next / slope;
+	for (float left = cloud_layer.y * slope / stride + 1.0; left > 0.0; left -= 1.0) {
+		p += ahead * next.x;
+		q += ahead * next.y;
+		z += dz;
+		vec2 to = vec2(packed_linear_of(thickness_packed, p, chosen), packed_linear_of(thickness_packed, q, chosen)) - z;
 		// Where cloud begins above a base that is clear, the side leans out as far as it may.
 		from -= mix(vec2(0.0), none, greaterThan(to, vec2(0.0)));
 		none = vec2(0.0);
 		vec2 filled = dz * (max(from, vec2(0.0)) + max(to, vec2(0.0))) / (abs(from) + abs(to) + 1e-3);
-		vec2 left = clear * exp(-filled * sharpness);
-		begins = mix(low + dz - filled, begins, greaterThan(from, vec2(0.0)));
-		part = clear - left + mix(vec2(0.0), part, greaterThan(from, vec2(0.0)));
+		vec2 passed = clear * exp(-filled * sharpness);
+		begins = mix(z - filled, begins, greaterThan(from, vec2(0.0)));
+		part = clear - passed + mix(vec2(0.0), part, greaterThan(from, vec2(0.0)));
 		height = mix(height, begins, greaterThan(part, most));
 		most = max(most, part);
-		clear = left;
+		clear = passed;
 		thickness += filled;
 		from = to;
+		next = vec2(stride);
+		dz = vec2(stride / slope);
 	}
 	side_low view;
 	view.thickness = thickness;
@@ -106,7 +110,7 @@ side_low side_low_at(vec2 place, vec2 heading, float mu_v, float footprint)
 	float upper = most.y / (most.x + most.y + 1e-6);
 	upper = mix(upper, step(0.5, upper), clamp(abs(height.x - height.y) / SIDE_LOW_APART - 1.0, 0.0, 1.0));
 	view.height = mix(height.x, height.y, upper);
-	view.place = place + ahead * view.height + flat_view * ((upper - 0.5) * 0.5 * strip);
+	view.place = place + flat_view * (slope * view.height + (upper - 0.5) * 0.5 * strip);
 	return view;
 }
 
@@ -151,6 +155,10 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	float spread = slab_light.w * lit.inside;
 	float column = mix(lit.inside, light.x, spread / (1.0 + spread));
 	lit.smooth_m = max(max(beam.x + beam.y, column), SIDE_LOW_WHOLE * min(max(view.thickness.x, view.thickness.y), cloud_layer.y));
+	vec2 behind = uv - height_sun_heading() * (SIDE_LOW_BEHIND_FAR * cloud_layer.y / cloud_layer.z);
+	float wide = max(log2(SIDE_LOW_BEHIND_WIDE * cloud_layer.y * SIDE_SIZE / cloud_layer.z), 0.0);
+	float mass = packed_linear(thickness_packed, behind, int(SIDE_SIZE), floor(wide + 0.5));
+	lit.smooth_m = max(lit.smooth_m, mix(lit.smooth_m, mass, SIDE_LOW_BEHIND * upright));
 	float through = side_transmitted(lit.smooth_m);
 	float back = (1.0 - through) * clamp(beam.z, SIDE_LOW_FACING.x, SIDE_LOW_FACING.y);
 	// Where parts of several clouds are seen and the place at their mean has less cloud around it than that: as much of either end for what is not known.

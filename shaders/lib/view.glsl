@@ -247,6 +247,16 @@ view_orders view_orders_of(view_point p, float m_l, float m_v, float thickness, 
 	return orders;
 }
 
+// Cosine to a facet as single scattering has it, which takes place a free path deep: facets are as large as that, so that light comes through crests, and what both grazes and faces the
+// sun is no mirror. flat: to the flat top, for which it stays as it is.
+const float VIEW_FACET_SOFT = 0.3;
+
+float view_facet_cosine(float facet, float flat_cosine)
+{
+	const float soft = VIEW_FACET_SOFT * VIEW_FACET_SOFT;
+	return flat_cosine * (facet + sqrt(facet * facet + soft)) / (flat_cosine + sqrt(flat_cosine * flat_cosine + soft));
+}
+
 // Light of the sun, of irradiance `sun` normal to its beam, that one lit side of the layer, base or top, sends to the viewer.
 void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 {
@@ -260,9 +270,9 @@ void view_layer_side(view_point p, bool base, vec3 sun, INOUT(view_parts) parts)
 #if VIEW_ABOVE
 	if (!through) {
 		// A facet turned away from light is faded out instead of cut. One turned away from the view is not seen: what says so is the crest that a pixel is on.
-		facing = smoothstep(-0.05, 0.15, p.mu_l_facet) * p.lit;
-		m_l = max(p.mu_l_facet, 0.03);
-		m_v = max(p.mu_v_facet, 0.1);
+		facing = smoothstep(-0.2, 0.15, p.mu_l_facet) * p.lit;
+		m_l = max(view_facet_cosine(p.mu_l_facet, max(mu_l, 0.03)), 0.03);
+		m_v = max(view_facet_cosine(p.mu_v_facet, m_v), 0.1);
 		thickness = p.way * m_v;
 		received = p.received;
 	}

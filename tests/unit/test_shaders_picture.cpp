@@ -488,12 +488,30 @@ static void color_alone_is_the_color(void **)
 	stop();
 }
 
+/* Facets of the tops are as soft as light goes deep: flat ones are as they were, averted ones get some light, none more than it has cosine.
+ */
+static void facets_are_soft(void **)
+{
+	for (float flat : {0.05f, 0.2f, 0.7f}) {
+		assert_float_equal(glsl::above::view_facet_cosine(flat, flat), flat, 1e-6);
+		assert_in_range((long)(1e3f * glsl::above::view_facet_cosine(-0.2f, flat)), 5, 90);
+		float last = 0;
+		for (int i = -20; i <= 20; i++) {
+			const float facet = 0.05f * (float)i, cosine = glsl::above::view_facet_cosine(facet, flat);
+			assert_true(cosine > last);
+			assert_true(facet <= flat || cosine < facet);
+			last = cosine;
+		}
+	}
+}
+
 int main()
 {
 	const char *path = getenv("STRATUS_KERNEL");
 	const CMUnitTest tests[] = {
 		cmocka_unit_test(gpu_shows_what_the_library_says),
 		cmocka_unit_test(compute_shows_what_fragments_show),
+		cmocka_unit_test(facets_are_soft),
 		cmocka_unit_test(color_alone_is_the_color),
 	};
 	shared.gl = gl_context_create(-1, false);

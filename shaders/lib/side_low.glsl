@@ -22,11 +22,14 @@ const int SIDE_LOW_SUN_STEPS = 2;
 const float SIDE_LOW_SHARP = 1.0;
 // Detail, which is of the thickness, is so much more of a side.
 const float SIDE_LOW_ROUGHER = 2.0;
-// Height, of that of the layer, from which on all that is seen is side.
+// Height, of that of the layer, from which on what is met is side.
 const float SIDE_LOW_UPRIGHT = 0.2;
+// Up a side the view becomes square to it, and light its own, over such heights, of that of the layer: light that is scattered often knows no edge between base and side.
+const float SIDE_LOW_SQUARE_OVER = 0.25;
+const float SIDE_LOW_OWN_OVER = 0.7;
 // What is seen belongs to a cloud so thick at least, of what the view meets.
 const float SIDE_LOW_WHOLE = 0.5;
-// Share of its own light that what lies at the base has; the rest is spread sideways.
+// Share of its own light that what lies at the base has; the rest is spread sideways, and fades out upwards.
 const float SIDE_LOW_OWN = 0.2;
 // A lit side sends back what the cloud behind it does, not what lies right below it alone: so much of how thick that is so far behind, in shares of the layer's height.
 const float SIDE_LOW_BEHIND = 0.7;
@@ -39,7 +42,7 @@ const float SIDE_LOW_INSIDE = 6.0;
 // Within a pixel, heights that differ by more than up to twice as much are those of different clouds, m.
 const float SIDE_LOW_APART = 20.0;
 // Row (shaders/lib/sky_table.glsl) of views under which slabs look as sides do, which are seen more squarely than any base.
-const float SIDE_LOW_SQUARE = 0.65;
+const float SIDE_LOW_SQUARE = 0.6;
 
 // Share of what is seen so.
 float side_low_share(float mu_v)
@@ -145,7 +148,8 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), floor(level + 0.5));
 	float detail = (thickness - base) * mix(1.0, SIDE_LOW_ROUGHER, upright);
 	side_lit lit;
-	lit.upright = upright;
+	float height = view.height / cloud_layer.y;
+	lit.upright = 1.0 - exp(-height / SIDE_LOW_SQUARE_OVER);
 	vec2 met = clamp(view.thickness + detail * view.thickness / (view.thickness + abs(detail) + 1e-3), vec2(0.0), vec2(cloud_layer.y));
 	// What lets through as much as both do at the mean, and what there is where cloud is.
 	lit.thickness = min(met.x, met.y) - log(0.5 + 0.5 * exp(-abs(met.x - met.y) * view.sharpness)) / view.sharpness;
@@ -164,7 +168,7 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	// Where parts of several clouds are seen and the place at their mean has less cloud around it than that: as much of either end for what is not known.
 	vec2 ends = vec2(beam) / max(lit.smooth_m, 1.0);
 	float own = mix(back, through, ends.x + 0.5 * max(1.0 - ends.x - ends.y, 0.0));
-	lit.light = mix(light.y, own, mix(SIDE_LOW_OWN, 1.0, upright)) / through;
+	lit.light = mix(own, light.y, (1.0 - SIDE_LOW_OWN) * exp(-height / SIDE_LOW_OWN_OVER)) / through;
 	return lit;
 }
 

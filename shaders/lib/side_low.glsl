@@ -39,6 +39,8 @@ const float SIDE_LOW_BEHIND_WIDE = 0.3; // over which that is a mean
 const vec2 SIDE_LOW_FACING = vec2(0.8, 1.6);
 // What is seen of a side lies inside by so much, on the sun's beam and along the vertical, m: single pixels at crests, where no cloud is before them, would glitter.
 const float SIDE_LOW_INSIDE = 6.0;
+// Of the base of one cloud and the side of another behind it, that is left out of which less than this share is seen.
+const float SIDE_LOW_OTHER = 0.04;
 // Within a pixel, heights that differ by more than up to twice as much are those of different clouds, m.
 const float SIDE_LOW_APART = 20.0;
 // Row (shaders/lib/sky_table.glsl) of views under which slabs look as sides do, which are seen more squarely than any base.
@@ -56,6 +58,9 @@ struct side_low {
 	float sharpness; // extinction along the view per m of it
 	float height;    // m over the base, where the cloud begins of which most is seen: the mean of several may lie in none
 	vec2 place;      // m, of that
+	float other;     // share in what is seen, 0 to 0.5, of a side where most is a base, and of a base where most is a side
+	float other_height;
+	vec2 other_place;
 };
 
 // place: where the view meets the base, m; heading: of the view, any length; mu_v: its cosine to the vertical; footprint: of the pixel, m.
@@ -82,8 +87,9 @@ side_low side_low_at(vec2 place, vec2 heading, float mu_v, float footprint)
 	vec2 clear = vec2(1.0);
 	vec2 begins = vec2(0.0);
 	vec2 part = vec2(0.0); // seen of the cloud that begins there
-	vec2 most = vec2(0.0);
-	vec2 height = vec2(0.0); // where the cloud begins of which most is seen
+	vec2 base_part = vec2(0.0); // seen of a cloud whose base is met
+	vec2 most = vec2(0.0);      // seen of any one cloud whose side is met
+	vec2 height = vec2(0.0);    // where that begins
 	vec2 z = vec2(0.0);
 	vec2 dz = next / slope;
 	for (float left = cloud_layer.y * slope / stride + 1.0; left > 0.0; left -= 1.0) {
@@ -98,8 +104,10 @@ side_low side_low_at(vec2 place, vec2 heading, float mu_v, float footprint)
 		vec2 passed = clear * exp(-filled * sharpness);
 		begins = mix(z - filled, begins, greaterThan(from, vec2(0.0)));
 		part = clear - passed + mix(vec2(0.0), part, greaterThan(from, vec2(0.0)));
-		height = mix(height, begins, greaterThan(part, most));
-		most = max(most, part);
+		vec2 sides = part * step(vec2(1e-3), begins);
+		base_part = max(base_part, part - sides);
+		height = mix(height, begins, greaterThan(sides, most));
+		most = max(most, sides);
 		clear = passed;
 		thickness += filled;
 		from = to;
@@ -112,8 +120,16 @@ side_low side_low_at(vec2 place, vec2 heading, float mu_v, float footprint)
 	// Of both, but of one where these are places of two clouds.
 	float upper = most.y / (most.x + most.y + 1e-6);
 	upper = mix(upper, step(0.5, upper), clamp(abs(height.x - height.y) / SIDE_LOW_APART - 1.0, 0.0, 1.0));
-	view.height = mix(height.x, height.y, upper);
-	view.place = place + flat_view * (slope * view.height + (upper - 0.5) * 0.5 * strip);
+	float side_height = mix(height.x, height.y, upper);
+	vec2 side_place = place + flat_view * (slope * side_height + (upper - 0.5) * 0.5 * strip);
+	vec2 base_place = place + flat_view * ((base_part.y / (base_part.x + base_part.y + 1e-6) - 0.5) * 0.5 * strip);
+	float side = (most.x + most.y) / (most.x + most.y + base_part.x + base_part.y + 1e-6);
+	bool mostly = side > 0.5;
+	view.height = mostly ? side_height : 0.0;
+	view.place = mostly ? side_place : base_place;
+	view.other = min(side, 1.0 - side);
+	view.other_height = mostly ? 0.0 : side_height;
+	view.other_place = mostly ? base_place : side_place;
 	return view;
 }
 
@@ -172,17 +188,30 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	return lit;
 }
 
+// The other thing in what is seen, to be lit as the first.
+side_low side_low_other(side_low view)
+{
+	view.height = view.other_height;
+	view.place = view.other_place;
+	return view;
+}
+
+// share: of b. x: in what hides; y: in what is seen.
+side_lit side_both(side_lit a, side_lit b, vec2 share)
+{
+	a.inside = mix(a.inside, b.inside, share.x);
+	a.thickness = mix(a.thickness, b.thickness, share.x);
+	a.sun = mix(a.sun, b.sun, share.y);
+	a.smooth_m = mix(a.smooth_m, b.smooth_m, share.y);
+	a.light = mix(a.light, b.light, share.y);
+	a.upright = mix(a.upright, b.upright, share.y);
+	return a;
+}
+
 // Of a view that is low in part: `share` of b, by how much cloud either sees. Where one sees none, light is the other's.
 side_lit side_mixed(side_lit a, side_lit b, float share)
 {
-	a.inside = mix(a.inside, b.inside, share);
-	a.thickness = mix(a.thickness, b.thickness, share);
-	share *= b.thickness / (a.thickness + 1e-6);
-	a.sun = mix(a.sun, b.sun, share);
-	a.smooth_m = mix(a.smooth_m, b.smooth_m, share);
-	a.light = mix(a.light, b.light, share);
-	a.upright = mix(a.upright, b.upright, share);
-	return a;
+	return side_both(a, b, vec2(share, share * b.thickness / (mix(a.thickness, b.thickness, share) + 1e-6)));
 }
 
 // Row of the slab's light that such a place shows, of the row of the view; both from 0 (horizon) to 1 (zenith).

@@ -416,7 +416,13 @@ side_lit view_side_lit(vec2 place, vec2 heading, float mu_v, float footprint)
 #if SIDE_LOW
 	side_low low = side_low_at(place, heading, mu_v, footprint);
 	// One place stands for both halves of a pixel: detail finer than half way from its square to its strip would come out as dots.
-	side_lit low_lit = side_low_lit(low, footprint, field_thickness(low.place, sqrt(footprint * camera_strip(footprint, mu_v))));
+	float detail = sqrt(footprint * camera_strip(footprint, mu_v));
+	side_lit low_lit = side_low_lit(low, footprint, field_thickness(low.place, detail));
+	// A loop, since software renders what is in a condition whether it holds or not.
+	for (float other = step(SIDE_LOW_OTHER, low.other); other > 0.0; other -= 1.0) {
+		side_low behind = side_low_other(low);
+		low_lit = side_both(low_lit, side_low_lit(behind, footprint, field_thickness(behind.place, detail)), vec2(low.other));
+	}
 #endif
 #if SIDE_LOW == 1
 	return low_lit;

@@ -404,6 +404,35 @@ static void a_low_view_sees_both_sides_of_an_edge(void **)
 	assert_true(half * 3 > 2 * quarter);
 }
 
+/* A bank before a wall that is in the sun: where the view leaves the one for the other, light goes over in steps smaller than the
+ * difference, since a bank lets through the more the less of it is met. */
+static void light_goes_over_from_a_base_to_the_side_behind(void **)
+{
+	const auto layer = [](double x, double) {
+		return x > 4000 && x < 4600 ? 0.15 * deepest : x > 5600 && x < 9000 ? 0.9 * deepest : 0.0;
+	};
+	make(layer, 40, 270);
+	double last = -1, least = 1e9, most = 0, largest = 0;
+	for (double x = 4200; x < 5000; x += 0.5) {
+		const glsl::spread_pass::side_low view = glsl::spread_pass::side_low_at(vec2((float)x, 5000), vec2(1, 0), 0.2f, 10);
+		const auto lit_at = [&](const glsl::spread_pass::side_low &seen) {
+			return glsl::spread_pass::side_low_lit(seen, 10, (float)layer((double)seen.place.x, 0));
+		};
+		glsl::spread_pass::side_lit lit = lit_at(view);
+		if (view.other > glsl::spread_pass::SIDE_LOW_OTHER)
+			lit = glsl::spread_pass::side_both(lit, lit_at(glsl::spread_pass::side_low_other(view)), vec2(view.other));
+		const double light = (double)(lit.light * glsl::spread_pass::side_transmitted(lit.smooth_m));
+		if (last >= 0)
+			largest = std::fmax(largest, std::fabs(light - last));
+		least = std::fmin(least, light);
+		most = std::fmax(most, light);
+		last = light;
+	}
+	print_message("from a base to a side light goes from %.2f to %.2f, by %.3f at most in half a metre\n", least, most, largest);
+	assert_true(most - least > 0.05);
+	assert_true(largest < 0.25 * (most - least));
+}
+
 /* A low bank with a wall behind it, the sun at the viewer's back: at no height of the view is it dark, though the mean of what is seen lies
  * in the gap. */
 static void low_views_see_a_bank_before_a_wall(void **)
@@ -491,6 +520,7 @@ int main()
 		cmocka_unit_test(low_views_see_a_lit_and_a_dark_wall),
 		cmocka_unit_test(what_is_not_seen_lends_no_light),
 		cmocka_unit_test(a_low_view_sees_both_sides_of_an_edge),
+		cmocka_unit_test(light_goes_over_from_a_base_to_the_side_behind),
 		cmocka_unit_test(low_views_see_a_bank_before_a_wall),
 	};
 	return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -159,7 +159,7 @@ side_lit side_lit_at(side_view view, float footprint, float thickness, float ins
 	thickness = mix(base, thickness, view.clear);
 	inside = mix(base, inside, view.clear);
 	// On sides detail is more or less of what is met there: added, it would end rims with an edge. A slanted way through the layer is all cloud at most.
-	float side = clamp(view.entry / (SIDE_HEIGHTS.y * cloud_layer.y), 0.0, 1.0);
+	float side = clamp(view.entry / (SIDE_HEIGHTS.y * max(cloud_layer.y, 1e-3)), 0.0, 1.0);
 	float whole = view.thickness;
 	float sided = min(side * 2.0, 1.0);
 	vec2 detail = (vec2(thickness, inside) - base) * (1.0 + SIDE_ROUGHER * sided);

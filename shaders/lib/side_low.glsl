@@ -71,7 +71,7 @@ side_low side_low_at(vec2 place, vec2 heading, float mu_v, float footprint)
 	// Steeper views are none of these, but are followed before that is known.
 	float slope = max(sqrt(max(1.0 - mu_v * mu_v, 0.0)) / mu_v, 1.0);
 	// Steps end at distances that are the same for neighbouring pixels: a crest that one of them looks at all look at, and none sees it pass between two steps.
-	float stride = SIDE_LOW_ACROSS * cloud_layer.y * exp2(max(floor(log2(slope / (SIDE_LOW_ACROSS * SIDE_LOW_STEPS)) + 0.5), 0.0));
+	float stride = max(SIDE_LOW_ACROSS * cloud_layer.y, 1.0) * exp2(max(floor(log2(slope / (SIDE_LOW_ACROSS * SIDE_LOW_STEPS)) + 0.5), 0.0));
 	vec2 base = vec2(dot(place - vec2(camera_position), flat_view)) + vec2(-0.25, 0.25) * strip;
 	vec2 next = (floor(base / stride) + 1.0) * stride - base;
 	float level = max(log2(max(stride, footprint) * SIDE_SIZE / cloud_layer.z) - SIDE_LOW_SHARP, 0.0);
@@ -150,7 +150,7 @@ vec3 side_low_beam(vec2 uv, float height)
 		passed.y += clamp(behind - height - below + 0.5 * down, 0.0, down);
 		rises += i == 0 ? ahead - behind : 0.0;
 	}
-	return vec3(passed, 1.0 - rises * 2.0 / (up + down));
+	return vec3(passed, 1.0 - rises * 2.0 / max(up + down, 1e-3));
 }
 
 // thickness: at view.place, with all detail, m.
@@ -160,11 +160,12 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	float level = max(log2(footprint * SIDE_SIZE / cloud_layer.z), 0.0);
 	vec4 light = textureLod(side_light, uv, level);
 	vec3 beam = side_low_beam(uv, view.height);
-	float upright = clamp(view.height / (SIDE_LOW_UPRIGHT * cloud_layer.y), 0.0, 1.0);
+	// A layer may be of no height.
+	float height = view.height / max(cloud_layer.y, 1e-3);
+	float upright = min(height / SIDE_LOW_UPRIGHT, 1.0);
 	float base = packed_linear(thickness_packed, uv, int(SIDE_SIZE), floor(level + 0.5));
 	float detail = (thickness - base) * mix(1.0, SIDE_LOW_ROUGHER, upright);
 	side_lit lit;
-	float height = view.height / cloud_layer.y;
 	lit.upright = 1.0 - exp(-height / SIDE_LOW_SQUARE_OVER);
 	vec2 met = clamp(view.thickness + detail * view.thickness / (view.thickness + abs(detail) + 1e-3), vec2(0.0), vec2(cloud_layer.y));
 	// What lets through as much as both do at the mean, and what there is where cloud is.
@@ -176,7 +177,7 @@ side_lit side_low_lit(side_low view, float footprint, float thickness)
 	float column = mix(lit.inside, light.x, spread / (1.0 + spread));
 	lit.smooth_m = max(max(beam.x + beam.y, column), SIDE_LOW_WHOLE * min(max(view.thickness.x, view.thickness.y), cloud_layer.y));
 	vec2 behind = uv - height_sun_heading() * (SIDE_LOW_BEHIND_FAR * cloud_layer.y / cloud_layer.z);
-	float wide = max(log2(SIDE_LOW_BEHIND_WIDE * cloud_layer.y * SIDE_SIZE / cloud_layer.z), 0.0);
+	float wide = log2(max(SIDE_LOW_BEHIND_WIDE * cloud_layer.y * SIDE_SIZE / cloud_layer.z, 1.0));
 	float mass = packed_linear(thickness_packed, behind, int(SIDE_SIZE), floor(wide + 0.5));
 	lit.smooth_m = max(lit.smooth_m, mix(lit.smooth_m, mass, SIDE_LOW_BEHIND * upright));
 	float through = side_transmitted(lit.smooth_m);
@@ -211,7 +212,9 @@ side_lit side_both(side_lit a, side_lit b, vec2 share)
 // Of a view that is low in part: `share` of b, by how much cloud either sees. Where one sees none, light is the other's.
 side_lit side_mixed(side_lit a, side_lit b, float share)
 {
-	return side_both(a, b, vec2(share, share * b.thickness / (mix(a.thickness, b.thickness, share) + 1e-6)));
+	float of_b = share * b.thickness;
+	// Not divided by the mean that mix() gives, which differs from it by rounding where b has hardly any cloud.
+	return side_both(a, b, vec2(share, of_b / ((1.0 - share) * a.thickness + of_b + 1e-6)));
 }
 
 // Row of the slab's light that such a place shows, of the row of the view; both from 0 (horizon) to 1 (zenith).

@@ -404,6 +404,19 @@ static void a_low_view_sees_both_sides_of_an_edge(void **)
 	assert_true(half * 3 > 2 * quarter);
 }
 
+/* A layer of no thickness has light that is a number. */
+static void a_layer_of_no_height_is_seen(void **)
+{
+	make([](double, double) { return 0.0; }, 40, 270);
+	const float height = glsl::cloud_layer.y;
+	glsl::cloud_layer.y = 0;
+	const glsl::spread_pass::side_low view = glsl::spread_pass::side_low_at(vec2(4000, 5000), vec2(1, 0), 0.2f, 10);
+	const glsl::spread_pass::side_lit lit = glsl::spread_pass::side_low_lit(view, 10, 0);
+	glsl::cloud_layer.y = height;
+	assert_true(std::isfinite(lit.thickness) && std::isfinite(lit.inside) && std::isfinite(lit.sun));
+	assert_true(std::isfinite(lit.smooth_m) && std::isfinite(lit.light) && std::isfinite(lit.upright));
+}
+
 /* A bank before a wall that is in the sun: where the view leaves the one for the other, light goes over in steps smaller than the
  * difference, since a bank lets through the more the less of it is met. */
 static void light_goes_over_from_a_base_to_the_side_behind(void **)
@@ -520,6 +533,7 @@ int main()
 		cmocka_unit_test(low_views_see_a_lit_and_a_dark_wall),
 		cmocka_unit_test(what_is_not_seen_lends_no_light),
 		cmocka_unit_test(a_low_view_sees_both_sides_of_an_edge),
+		cmocka_unit_test(a_layer_of_no_height_is_seen),
 		cmocka_unit_test(light_goes_over_from_a_base_to_the_side_behind),
 		cmocka_unit_test(low_views_see_a_bank_before_a_wall),
 	};
